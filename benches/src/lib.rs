@@ -1,0 +1,1 @@
+//! Bench bodies by stage and by scene.

@@ -1,0 +1,3 @@
+//! What moves cloth: material, forces, integrators, the linear solver.
+
+pub use cloth_mesh as mesh;

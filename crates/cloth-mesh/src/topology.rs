@@ -1,0 +1,109 @@
+//! What follows from the triangles alone: edges, hinges, adjacency, boundary.
+
+use crate::{MeshError, NONE};
+
+/// Two triangles that share an edge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hinge {
+    /// Vertices of the shared edge, in the order in which the first triangle walks it.
+    pub edge: [u32; 2],
+    /// The vertex opposite the edge in the first and in the second triangle.
+    pub opposite: [u32; 2],
+    /// The two triangles.
+    pub triangles: [u32; 2],
+}
+
+/// Connectivity of a triangle mesh. Edges are sorted by (lower vertex, higher vertex), so equal triangles give equal
+/// topologies.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Topology {
+    /// Number of vertices.
+    pub vertex_count: usize,
+    /// Edges as (lower, higher) vertex, sorted.
+    pub edges: Vec<[u32; 2]>,
+    /// Edge of each triangle's sides (01, 12, 20).
+    pub triangle_edges: Vec<[u32; 3]>,
+    /// First two triangles of each edge; [`NONE`] where there is none.
+    pub edge_triangles: Vec<[u32; 2]>,
+    /// Edges with exactly two triangles, in edge order.
+    pub hinges: Vec<Hinge>,
+    /// Edges with exactly one triangle, in edge order.
+    pub boundary_edges: Vec<u32>,
+    /// Edges with more than two triangles, in edge order, with the number of triangles.
+    pub non_manifold_edges: Vec<(u32, u32)>,
+    vertex_triangle_offsets: Vec<u32>,
+    vertex_triangle_list: Vec<u32>,
+}
+
+impl Topology {
+    /// Connectivity of `triangles` over `vertex_count` vertices. Indices must be in range ([`crate::TriMesh::check`]).
+    pub fn new(vertex_count: usize, triangles: &[[u32; 3]]) -> Self {
+        // (lower, higher, triangle, side), sorted: runs of equal vertex pairs are the edges.
+        let mut sides: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(3 * triangles.len());
+        for (t, tri) in triangles.iter().enumerate() {
+            for side in 0..3 {
+                let (a, b) = (tri[side], tri[(side + 1) % 3]);
+                sides.push((a.min(b), a.max(b), t as u32, side as u8));
+            }
+        }
+        sides.sort_unstable();
+
+        let mut topology =
+            Self { vertex_count, triangle_edges: vec![[NONE; 3]; triangles.len()], ..Self::default() };
+        for run in sides.chunk_by(|p, q| (p.0, p.1) == (q.0, q.1)) {
+            let edge = topology.edges.len() as u32;
+            topology.edges.push([run[0].0, run[0].1]);
+            for &(_, _, t, side) in run {
+                topology.triangle_edges[t as usize][side as usize] = edge;
+            }
+            topology.edge_triangles.push([run[0].2, run.get(1).map_or(NONE, |s| s.2)]);
+            match run {
+                [_] => topology.boundary_edges.push(edge),
+                &[(_, _, t0, s0), (_, _, t1, s1)] => {
+                    let (first, second) = (triangles[t0 as usize], triangles[t1 as usize]);
+                    let (s0, s1) = (s0 as usize, s1 as usize);
+                    topology.hinges.push(Hinge {
+                        edge: [first[s0], first[(s0 + 1) % 3]],
+                        opposite: [first[(s0 + 2) % 3], second[(s1 + 2) % 3]],
+                        triangles: [t0, t1],
+                    });
+                }
+                _ => topology.non_manifold_edges.push((edge, run.len() as u32)),
+            }
+        }
+
+        let mut offsets = vec![0u32; vertex_count + 1];
+        for &v in triangles.iter().flatten() {
+            offsets[v as usize + 1] += 1;
+        }
+        for v in 0..vertex_count {
+            offsets[v + 1] += offsets[v];
+        }
+        let mut next = offsets.clone();
+        let mut list = vec![0u32; 3 * triangles.len()];
+        for (t, tri) in triangles.iter().enumerate() {
+            for &v in tri {
+                list[next[v as usize] as usize] = t as u32;
+                next[v as usize] += 1;
+            }
+        }
+        topology.vertex_triangle_offsets = offsets;
+        topology.vertex_triangle_list = list;
+        topology
+    }
+
+    /// Triangles that use `vertex`, ascending.
+    pub fn vertex_triangles(&self, vertex: u32) -> &[u32] {
+        let v = vertex as usize;
+        let (lo, hi) = (self.vertex_triangle_offsets[v], self.vertex_triangle_offsets[v + 1]);
+        &self.vertex_triangle_list[lo as usize..hi as usize]
+    }
+
+    /// Refuses an edge with more than two triangles, where bending is not defined.
+    ///
+    /// # Errors
+    /// [`MeshError::NonManifoldEdge`] with the first such edge.
+    pub fn require_manifold(&self) -> Result<(), MeshError> {
+        todo!()
+    }
+}

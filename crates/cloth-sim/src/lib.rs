@@ -1,0 +1,1 @@
+//! Scene, effect plan, step loop, reports, checkpoints and frames.
