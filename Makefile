@@ -1,0 +1,58 @@
+# Everything a person does with this repository. `make help` lists the targets.
+PYTHON ?= $(firstword $(foreach p,python3.11 python3.12 python3.13 python3,$(shell command -v $(p))))
+VENV := .venv
+BIN := $(VENV)/bin
+export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
+
+.DEFAULT_GOAL := help
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema clean
+
+help: ## List the targets
+	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(VENV)/.ready ## System packages (as root), virtual environment and pinned Python packages
+
+$(VENV)/.ready: python/requirements.txt tools/setup.sh
+	bash tools/setup.sh "$(PYTHON)" "$(VENV)"
+	@touch $@
+
+build: setup ## Compile the engine (release) and install `clothsim` into the virtual environment
+	$(BIN)/maturin develop --release --locked
+
+demo: build ## Run the main job: a tablecloth falls on a sphere, drapes and is turned; results in out/demo
+	$(BIN)/clothsim run examples/drape.toml -o out/demo --overwrite
+
+test: test-rust test-python ## All tests, Rust and Python
+
+test-rust: setup ## Unit, oracle and physics tests of the Rust crates, doc tests included
+	cargo test --release --locked
+
+test-python: build ## Behavioural tests through the Python package and the command line
+	$(BIN)/pytest
+
+lint: build ## Formatting, clippy, crate arrows, ruff, mypy, stubs: clean or failing
+	cargo fmt --all --check
+	cargo clippy --release --locked --workspace --all-targets -- -D warnings
+	$(BIN)/python tools/check_arrows.py
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/stubtest clothsim._core
+
+fmt: setup ## Format all sources
+	cargo fmt --all
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: setup ## Criterion benches of every kernel and scene (minutes); one of them: cargo bench --bench NAME
+	cargo bench --locked -p cloth-benches
+
+compare: build ## Detection side by side with IPC Toolkit, in one run (installs it into the environment)
+	$(BIN)/pip install --quiet "ipctk==1.6.1"
+	$(BIN)/python benches/compare_ipctk.py
+
+schema: build ## Print the JSON schema of scene files
+	$(BIN)/clothsim schema
+
+clean: ## Remove what the targets above made
+	rm -rf target $(VENV) out
