@@ -1,0 +1,157 @@
+//! The scene's collision topology: all bodies in one vertex array, features, their owners and the rules for pairs.
+
+use crate::DetectError;
+use cloth_mesh::{NONE, Topology};
+
+/// What a body is to contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Body {
+    /// It moves by forces (cloth). Two bodies of which neither is dynamic are not tested against each other.
+    pub dynamic: bool,
+    /// Its features are tested against each other.
+    pub self_collision: bool,
+}
+
+/// Scene-wide collision topology, built once.
+///
+/// A pair of features is *admissible* if it shares no vertex; if both are of one body, that body has
+/// `self_collision`; if they are of different bodies, one of these is dynamic; and no feature has a vertex attached
+/// to the other's body. A vertex in no triangle is no part of a surface and meets nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CollisionMesh {
+    /// Number of vertices of all bodies.
+    pub vertex_count: usize,
+    /// Triangles of all bodies, global vertex indices.
+    pub triangles: Vec<[u32; 3]>,
+    /// Edges as (lower, higher) vertex, sorted.
+    pub edges: Vec<[u32; 2]>,
+    /// Edge of each triangle's sides (01, 12, 20).
+    pub triangle_edges: Vec<[u32; 3]>,
+    /// Body of each vertex.
+    pub vertex_body: Vec<u32>,
+    /// The bodies, in vertex order.
+    pub bodies: Vec<Body>,
+    /// Body to which each vertex is attached, or [`NONE`].
+    pub attached_to: Vec<u32>,
+    /// R-triangle assignment: the triangle that tests each vertex for all ([`NONE`]: the vertex is in no triangle).
+    pub vertex_owner: Vec<u32>,
+    /// R-triangle assignment: the triangle that tests each edge for all.
+    pub edge_owner: Vec<u32>,
+    has_attachments: bool,
+}
+
+impl CollisionMesh {
+    /// One dynamic, self-colliding body.
+    ///
+    /// # Errors
+    /// As [`CollisionMesh::new`].
+    pub fn single(vertex_count: usize, triangles: &[[u32; 3]]) -> Result<Self, DetectError> {
+        Self::new(&[(Body { dynamic: true, self_collision: true }, vertex_count, triangles)])
+    }
+
+    /// The given bodies, each with its vertex count and triangles (body-local indices), concatenated in order.
+    ///
+    /// # Errors
+    /// [`DetectError::IndexOutOfRange`], [`DetectError::RepeatedVertex`], [`DetectError::TooLarge`].
+    pub fn new(bodies: &[(Body, usize, &[[u32; 3]])]) -> Result<Self, DetectError> {
+        let limit = NONE as usize;
+        let vertex_count: usize = bodies.iter().map(|b| b.1).sum();
+        let triangle_count: usize = bodies.iter().map(|b| b.2.len()).sum();
+        for (what, got) in [("vertices", vertex_count), ("triangle sides", 3 * triangle_count)] {
+            if got >= limit {
+                return Err(DetectError::TooLarge { what, limit, got });
+            }
+        }
+        let mut triangles = Vec::with_capacity(triangle_count);
+        let mut vertex_body = Vec::with_capacity(vertex_count);
+        for (b, (_, count, list)) in bodies.iter().enumerate() {
+            let first = vertex_body.len() as u32;
+            for (t, &tri) in list.iter().enumerate() {
+                if let Some(&index) = tri.iter().find(|&&v| v as usize >= *count) {
+                    return Err(DetectError::IndexOutOfRange {
+                        body: b,
+                        triangle: t,
+                        index,
+                        vertex_count: *count,
+                    });
+                }
+                if tri[0] == tri[1] || tri[1] == tri[2] || tri[2] == tri[0] {
+                    return Err(DetectError::RepeatedVertex { body: b, triangle: t, vertices: tri });
+                }
+                triangles.push(tri.map(|v| v + first));
+            }
+            vertex_body.resize(vertex_body.len() + count, b as u32);
+        }
+        let Topology { edges, triangle_edges, .. } = Topology::new(vertex_count, &triangles);
+        let mut vertex_owner = vec![NONE; vertex_count];
+        let mut edge_owner = vec![NONE; edges.len()];
+        for t in (0..triangles.len()).rev() {
+            for k in 0..3 {
+                vertex_owner[triangles[t][k] as usize] = t as u32;
+                edge_owner[triangle_edges[t][k] as usize] = t as u32;
+            }
+        }
+        Ok(Self {
+            vertex_count,
+            triangles,
+            edges,
+            triangle_edges,
+            vertex_body,
+            bodies: bodies.iter().map(|b| b.0).collect(),
+            attached_to: vec![NONE; vertex_count],
+            vertex_owner,
+            edge_owner,
+            has_attachments: false,
+        })
+    }
+
+    /// Declares that `vertex` is held by `body`: features with this vertex are not tested against that body.
+    ///
+    /// # Panics
+    /// If there is no such vertex or body.
+    pub fn set_attachment(&mut self, vertex: u32, body: u32) {
+        assert!((body as usize) < self.bodies.len(), "no body {body}");
+        self.attached_to[vertex as usize] = body;
+        self.has_attachments = true;
+    }
+
+    /// Whether features of these two bodies may be in contact at all.
+    pub fn bodies_meet(&self, a: u32, b: u32) -> bool {
+        let (first, second) = (self.bodies[a as usize], self.bodies[b as usize]);
+        if a == b { first.self_collision } else { first.dynamic || second.dynamic }
+    }
+
+    /// Whether the pair is admissible (see [`CollisionMesh`]).
+    pub fn vertex_triangle_admissible(&self, vertex: u32, triangle: u32) -> bool {
+        self.admissible(&[vertex], &self.triangles[triangle as usize])
+    }
+
+    /// Whether the pair is admissible (see [`CollisionMesh`]).
+    pub fn edge_edge_admissible(&self, a: u32, b: u32) -> bool {
+        self.admissible(&self.edges[a as usize], &self.edges[b as usize])
+    }
+
+    pub(crate) fn triangles_admissible(&self, a: u32, b: u32) -> bool {
+        self.rules_allow(&self.triangles[a as usize], &self.triangles[b as usize])
+    }
+
+    #[inline]
+    fn admissible(&self, first: &[u32], second: &[u32]) -> bool {
+        if first.iter().any(|v| second.contains(v)) {
+            return false;
+        }
+        self.rules_allow(first, second)
+    }
+
+    /// The rules of bodies and attachments, without the shared-vertex rule.
+    #[inline]
+    pub(crate) fn rules_allow(&self, first: &[u32], second: &[u32]) -> bool {
+        let (a, b) = (self.vertex_body[first[0] as usize], self.vertex_body[second[0] as usize]);
+        if !self.bodies_meet(a, b) {
+            return false;
+        }
+        !(self.has_attachments
+            && (first.iter().any(|&v| self.attached_to[v as usize] == b)
+                || second.iter().any(|&v| self.attached_to[v as usize] == a)))
+    }
+}

@@ -1,0 +1,34 @@
+//! The contract of every detection method, and their names.
+
+use crate::{BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Query, Vec3};
+
+const KNOWN: &str = "\"brute\", \"bvh\"";
+
+/// Finds every admissible pair in contact; see the crate's head for the contract.
+pub trait Detector: Send {
+    /// The method's name, as [`detector`] takes it.
+    fn name(&self) -> &'static str;
+
+    /// All contacts of the query: unique, sorted, the same bits for any number of threads.
+    ///
+    /// # Errors
+    /// What [`Query::check`] refuses; [`DetectError::OtherMesh`].
+    fn detect(
+        &mut self,
+        mesh: &CollisionMesh,
+        query: &Query<'_>,
+        pool: &rayon::ThreadPool,
+    ) -> Result<Contacts, DetectError>;
+}
+
+/// The detector of that name for `mesh`, whose positions are now `x` \[m\] (they shape the tree, not the answers).
+///
+/// # Errors
+/// [`DetectError::UnknownDetector`] with the names that exist; what [`Bvh::new`] refuses.
+pub fn detector(name: &str, mesh: &CollisionMesh, x: &[Vec3]) -> Result<Box<dyn Detector>, DetectError> {
+    match name {
+        "brute" => Ok(Box::new(BruteForce)),
+        "bvh" => Ok(Box::new(Bvh::new(mesh, x)?)),
+        _ => Err(DetectError::UnknownDetector { known: KNOWN, got: name.to_owned() }),
+    }
+}
