@@ -1,0 +1,86 @@
+//! Why a system is not built or a step is not taken.
+
+use crate::solver::SolveError;
+
+/// A defect of the input, naming the element or the parameter.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CoreError {
+    /// A parameter is out of range.
+    #[error("{name}: expected {expected}, got {got}")]
+    Parameter {
+        /// Name of the parameter, as in a scene file (`in_plane.warp`).
+        name: &'static str,
+        /// What was expected, with the unit.
+        expected: &'static str,
+        /// What came.
+        got: f64,
+    },
+    /// The library has no material of this name.
+    #[error("material: expected one of {known:?}, got \"{got}\"")]
+    UnknownMaterial {
+        /// The name that came.
+        got: String,
+        /// Names in the library.
+        known: Vec<&'static str>,
+    },
+    /// An element has no extent in its rest shape, so its law is not defined.
+    #[error("{model}: expected elements with an extent, element {element} (vertices {vertices:?}) has {measure} {got:e}")]
+    Degenerate {
+        /// The force model.
+        model: &'static str,
+        /// Index of the first such element: edge, triangle or hinge of its mesh.
+        element: usize,
+        /// Its vertices in the mesh.
+        vertices: Vec<u32>,
+        /// What is too small, with the unit.
+        measure: &'static str,
+        /// Its value.
+        got: f64,
+    },
+    /// Arrays that belong together have different lengths.
+    #[error("{name}: expected length {expected}, got {got}")]
+    Length {
+        /// Name of the array.
+        name: &'static str,
+        /// Expected length.
+        expected: usize,
+        /// Its length.
+        got: usize,
+    },
+    /// A vertex of the cloth range belongs to no part, so it has no mass.
+    #[error("vertices: expected every cloth vertex in a triangle of a part, vertex {vertex} is in none")]
+    Massless {
+        /// Index of the first such vertex.
+        vertex: usize,
+    },
+}
+
+/// Why a step was not taken. Positions and velocities are as before the call.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// The step is not positive and finite.
+    #[error("dt: expected a positive finite step in s, got {got}")]
+    TimeStep {
+        /// What came [s].
+        got: f64,
+    },
+    /// State arrays are shorter than the system.
+    #[error("{name}: expected at least {expected} vertices, got {got}")]
+    Length {
+        /// Name of the array.
+        name: &'static str,
+        /// Vertices of the system.
+        expected: usize,
+        /// What came.
+        got: usize,
+    },
+    /// Pins are not sorted, not unique, out of range, or of unequal lengths.
+    #[error("pins: expected ascending cloth vertices with one target each, entry {entry} is wrong")]
+    Pins {
+        /// Index of the first wrong entry.
+        entry: usize,
+    },
+    /// The linear solver broke down.
+    #[error(transparent)]
+    Solver(#[from] SolveError),
+}

@@ -1,0 +1,66 @@
+//! The linear solver of the implicit schemes: Params, Info, Error.
+
+/// Which solver.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverMethod {
+    /// Preconditioned conjugate gradient on 3×3 blocks.
+    #[default]
+    Pcg,
+    /// faer's conjugate gradient on the same matrix.
+    FaerCg,
+    /// faer's sparse Cholesky factorisation, analysed once.
+    FaerLlt,
+}
+
+/// How to solve A x = b.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SolverParams {
+    /// Solver.
+    pub method: SolverMethod,
+    /// Iterative solvers stop at this residual, ‖b − A x‖ / ‖b‖ over the free vertices.
+    pub tolerance: f64,
+    /// Iterative solvers stop after this many iterations.
+    pub max_iterations: usize,
+}
+
+impl Default for SolverParams {
+    fn default() -> Self {
+        Self { method: SolverMethod::Pcg, tolerance: 1e-4, max_iterations: 500 }
+    }
+}
+
+/// What happened in a solve.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SolveInfo {
+    /// Iterations done (0 for a direct solver).
+    pub iterations: usize,
+    /// Relative residual reached.
+    pub residual: f64,
+    /// Whether the tolerance was met.
+    pub converged: bool,
+}
+
+/// Why a solve broke down.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SolveError {
+    /// A direction of non-positive curvature was met, or a pivot was not positive.
+    #[error("linear solver: expected a positive definite matrix, iteration {iteration} found curvature {curvature:e}")]
+    NotPositiveDefinite {
+        /// Iteration, or index of the scalar row for a factorisation.
+        iteration: usize,
+        /// pᵀAp, or NaN where the solver does not tell.
+        curvature: f64,
+    },
+    /// A value was NaN or infinite.
+    #[error("linear solver: expected finite values, iteration {iteration} met {value}")]
+    NotFinite {
+        /// Iteration.
+        iteration: usize,
+        /// What was met.
+        value: f64,
+    },
+}
