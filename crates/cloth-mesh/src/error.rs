@@ -57,6 +57,30 @@ pub enum MeshError {
         /// Entries that came.
         got: usize,
     },
+    /// A material coordinate is NaN or infinite.
+    #[error("uv: expected finite coordinates, triangle {triangle} has {uv:?}")]
+    UvNotFinite {
+        /// Index of the first such triangle.
+        triangle: usize,
+        /// Its three corners [m].
+        uv: [[f64; 2]; 3],
+    },
+    /// A triangle's UV panel has no area.
+    #[error("uv: expected panels with non-zero area, triangle {triangle} has {area:e} m²")]
+    ZeroAreaUv {
+        /// Index of the first such triangle.
+        triangle: usize,
+        /// Its area in the panel [m²].
+        area: f64,
+    },
+    /// The same three vertices make two triangles, so the angle between them is not defined.
+    #[error("triangles: expected each triangle once, triangles {} and {} have the same vertices {vertices:?}", triangles[0], triangles[1])]
+    DuplicateTriangle {
+        /// The two triangles.
+        triangles: [u32; 2],
+        /// Their vertices.
+        vertices: [u32; 3],
+    },
     /// A generator's parameter is out of range.
     #[error("{parameter}: expected {expected}, got {got}")]
     Parameter {

@@ -2,6 +2,9 @@
 
 use crate::{MeshError, NONE};
 
+/// How many triangles an error about an edge lists.
+const MAX_NAMED_TRIANGLES: usize = 8;
+
 /// Two triangles that share an edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Hinge {
@@ -99,11 +102,97 @@ impl Topology {
         &self.vertex_triangle_list[lo as usize..hi as usize]
     }
 
-    /// Refuses an edge with more than two triangles, where bending is not defined.
+    /// Whether every edge has exactly two triangles, i.e. the surface has no boundary.
+    pub fn is_closed(&self) -> bool {
+        self.boundary_edges.is_empty() && self.non_manifold_edges.is_empty() && !self.edges.is_empty()
+    }
+
+    /// Whether the two triangles of every hinge walk their edge in opposite directions, i.e. one side is the front
+    /// everywhere. `triangles` are those the topology was made of.
+    pub fn is_oriented(&self, triangles: &[[u32; 3]]) -> bool {
+        self.hinges.iter().all(|hinge| {
+            let second = triangles[hinge.triangles[1] as usize];
+            (0..3).any(|k| [second[(k + 1) % 3], second[k]] == hinge.edge)
+        })
+    }
+
+    /// Refuses what bending is not defined on: an edge with more than two triangles, or two triangles with the same
+    /// three vertices.
     ///
     /// # Errors
-    /// [`MeshError::NonManifoldEdge`] with the first such edge.
+    /// [`MeshError::NonManifoldEdge`] with the first such edge and its first eight triangles;
+    /// [`MeshError::DuplicateTriangle`] with the first such pair.
     pub fn require_manifold(&self) -> Result<(), MeshError> {
-        todo!()
+        if let Some(&(edge, count)) = self.non_manifold_edges.first() {
+            let [a, b] = self.edges[edge as usize];
+            let triangles = self
+                .vertex_triangles(a)
+                .iter()
+                .copied()
+                .filter(|&t| self.triangle_edges[t as usize].contains(&edge))
+                .take(MAX_NAMED_TRIANGLES)
+                .collect();
+            return Err(MeshError::NonManifoldEdge { edge: [a, b], count: count as usize, triangles });
+        }
+        match self.hinges.iter().find(|h| h.opposite[0] == h.opposite[1]) {
+            Some(h) => Err(MeshError::DuplicateTriangle {
+                triangles: h.triangles,
+                vertices: [h.edge[0], h.edge[1], h.opposite[0]],
+            }),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_triangles_make_one_hinge() {
+        let triangles = [[0, 1, 2], [2, 1, 3]];
+        let topology = Topology::new(4, &triangles);
+        assert_eq!(topology.edges, [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]]);
+        assert_eq!(topology.triangle_edges, [[0, 2, 1], [2, 3, 4]]);
+        assert_eq!(topology.hinges, [Hinge { edge: [1, 2], opposite: [0, 3], triangles: [0, 1] }]);
+        assert_eq!(topology.boundary_edges, [0, 1, 3, 4]);
+        assert_eq!(topology.vertex_triangles(1), [0, 1]);
+        assert_eq!(topology.vertex_triangles(3), [1]);
+        assert_eq!(topology.require_manifold(), Ok(()));
+        assert!(topology.is_oriented(&triangles) && !topology.is_closed());
+    }
+
+    #[test]
+    fn a_flipped_triangle_is_seen() {
+        let triangles = [[0, 1, 2], [1, 2, 3]];
+        assert!(!Topology::new(4, &triangles).is_oriented(&triangles));
+    }
+
+    #[test]
+    fn three_triangles_on_an_edge_are_refused_by_name() {
+        let topology = Topology::new(5, &[[0, 1, 2], [1, 0, 3], [0, 1, 4]]);
+        assert_eq!(
+            topology.require_manifold(),
+            Err(MeshError::NonManifoldEdge { edge: [0, 1], count: 3, triangles: vec![0, 1, 2] })
+        );
+        assert!(!topology.is_closed());
+        let error = topology.require_manifold().unwrap_err().to_string();
+        assert!(error.contains("edge (0, 1) has 3"), "{error}");
+    }
+
+    #[test]
+    fn a_triangle_twice_is_refused_by_name() {
+        let topology = Topology::new(3, &[[0, 1, 2], [1, 2, 0]]);
+        assert!(matches!(
+            topology.require_manifold(),
+            Err(MeshError::DuplicateTriangle { triangles: [0, 1], .. })
+        ));
+    }
+
+    #[test]
+    fn nothing_at_all() {
+        let topology = Topology::new(0, &[]);
+        assert!(topology.edges.is_empty() && !topology.is_closed());
+        assert_eq!(topology.require_manifold(), Ok(()));
     }
 }
