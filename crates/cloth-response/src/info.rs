@@ -1,0 +1,40 @@
+//! What the response did in one step.
+
+/// Counts and seconds of one accepted step.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ResponseInfo {
+    /// Pairs within the thickness at `x_t0`.
+    pub proximities: usize,
+    /// Continuous detections over the step, the first (over all pairs) included.
+    pub passes: usize,
+    /// Pairs that collided in the first of them: what the repulsion left.
+    pub collisions: usize,
+    /// Contacts that carry an impulse in the end.
+    pub impulses: usize,
+    /// Sweeps over the contacts, all passes together.
+    pub sweeps: usize,
+    /// Largest error of a contact's relative velocity after the last sweep [m/s].
+    pub residual: f64,
+    /// Rigid impact zones.
+    pub zones: usize,
+    /// Vertices in them.
+    pub zone_vertices: usize,
+    /// Vertices whose motion was held back (partly or fully).
+    pub held_vertices: usize,
+    /// Pairs exempt because they are in contact already at `x_t0` (known-intersecting starts only).
+    pub exempt: usize,
+    /// Pairs that still collide, exempt ones aside: always 0 in an accepted step.
+    pub remaining: usize,
+    /// Seconds per stage, in the order in which the stages run.
+    pub seconds: Vec<(&'static str, f64)>,
+}
+
+impl ResponseInfo {
+    /// Adds seconds to a stage, which keeps the place of its first mention.
+    pub(crate) fn add_seconds(&mut self, stage: &'static str, seconds: f64) {
+        match self.seconds.iter_mut().find(|(name, _)| *name == stage) {
+            Some((_, sum)) => *sum += seconds,
+            None => self.seconds.push((stage, seconds)),
+        }
+    }
+}
