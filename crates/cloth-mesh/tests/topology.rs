@@ -47,9 +47,12 @@ fn complaint(n: usize, triangles: &[[u32; 3]], topology: &Topology) -> Option<St
                     let Some(h) = topology.hinges.get(hinges) else {
                         return Some(format!("edge {edge}: no hinge"));
                     };
-                    let opposite = users
-                        .iter()
-                        .map(|&t| *triangles[t as usize].iter().find(|v| **v != a && **v != b).unwrap());
+                    let opposite = users.iter().map(|&t| {
+                        *triangles[t as usize]
+                            .iter()
+                            .find(|v| **v != a && **v != b)
+                            .expect("a triangle has a third vertex")
+                    });
                     let sorted = [h.edge[0].min(h.edge[1]), h.edge[0].max(h.edge[1])];
                     let first = triangles[users[0] as usize];
                     let walks = (0..3).any(|k| [first[k], first[(k + 1) % 3]] == h.edge);
