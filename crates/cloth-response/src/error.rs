@@ -31,9 +31,9 @@ pub enum ResponseError {
         /// Index of the first such vertex.
         vertex: usize,
     },
-    /// Detection failed.
-    #[error("detection: {0}")]
-    Detect(String),
+    /// Detection refused its input.
+    #[error(transparent)]
+    Detect(#[from] cloth_collision::DetectError),
     /// Collisions remain that no allowed motion avoids within this step: cloth caught between prescribed motions, or
     /// pairs in contact already at the start. Retry with a smaller step.
     #[error("{} pairs still collide after every stage, first vertices {:?}", pairs.len(), vertices.iter().take(8).collect::<Vec<_>>())]

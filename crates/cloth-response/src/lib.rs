@@ -8,7 +8,12 @@ pub use cloth_collision as collision;
 mod error;
 mod info;
 mod params;
+mod respond;
 
 pub use error::ResponseError;
 pub use info::ResponseInfo;
 pub use params::{FrictionRule, ResponseParams};
+pub use respond::Responder;
+
+/// A point [m], velocity [m/s] or impulse [N s] in space.
+pub type Vec3 = cloth_collision::Vec3;
