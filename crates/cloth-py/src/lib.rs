@@ -1,1 +1,34 @@
-//! Skeleton.
+//! `clothsim._core`: conversion between Python and the engine, nothing else.
+//!
+//! The Python package `clothsim` is the public face; nothing here is meant to be called by a person.
+
+mod collision;
+mod convert;
+mod detach;
+mod errors;
+mod mesh;
+
+use pyo3::prelude::*;
+
+/// The compiled half of clothsim. Private: use the package.
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("BUILD_PROFILE", if cfg!(debug_assertions) { "debug" } else { "release" })?;
+
+    module.add_function(wrap_pyfunction!(mesh::check_mesh, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::grid, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::disc, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::ribbon, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::cylinder, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::cone, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::capsule, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::sphere, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::cuboid, module)?)?;
+
+    module.add_function(wrap_pyfunction!(collision::detect, module)?)?;
+    module.add_function(wrap_pyfunction!(collision::vertex_triangle_ccd, module)?)?;
+    module.add_function(wrap_pyfunction!(collision::edge_edge_ccd, module)?)?;
+    module.add_function(wrap_pyfunction!(collision::self_intersections, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,51 @@
+"""Arguments into the arrays that the compiled module takes, and optional packages."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clothsim.errors import InvalidInput, MissingDependency
+
+__all__ = ["Floats", "Ints", "floats", "indices", "optional", "shape_text"]
+
+Floats: TypeAlias = NDArray[np.float64]
+Ints: TypeAlias = NDArray[np.int64]
+
+
+def floats(value: ArrayLike, name: str, shape: str = "") -> Floats:
+    """C-contiguous float64; real numbers that float64 holds exactly are widened, everything else is refused."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiu" or array.dtype.itemsize > 8:
+        raise _wrong(array, name, f"{shape} and float64".strip(" and") if not shape else f"{shape} and float64")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def indices(value: ArrayLike, name: str, shape: str = "shape (m, 3)") -> Ints:
+    """C-contiguous int64 from int32 or int64; other types are refused, not converted."""
+    array = np.asarray(value)
+    if array.dtype not in (np.dtype(np.int32), np.dtype(np.int64)) and array.size:
+        raise _wrong(array, name, f"{shape} and int32 or int64")
+    return np.ascontiguousarray(array, dtype=np.int64)
+
+
+def _wrong(array: NDArray[Any], name: str, expected: str) -> InvalidInput:
+    got = f"{shape_text(array)}, {array.dtype}"
+    return InvalidInput(f"{name}: expected {expected}, got {got}", name=name, expected=expected, got=got)
+
+
+def shape_text(array: NDArray[Any]) -> str:
+    """``"shape (12, 4)"``."""
+    return f"shape {array.shape}"
+
+
+def optional(module: str, *, extra: str, purpose: str) -> Any:
+    """Import an optional package; where it is missing, say what it is for and how to get it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        message = f"{purpose} needs the package {module.split('.')[0]}: pip install 'clothsim[{extra}]'"
+        raise MissingDependency(message) from error

@@ -1,0 +1,41 @@
+"""The choice of a device and of threads."""
+
+from __future__ import annotations
+
+import operator
+
+from clothsim.errors import GpuUnavailable, InvalidInput
+
+__all__ = ["check_device", "check_threads"]
+
+
+def check_device(device: str) -> str:
+    """Return ``"cpu"`` for what this build can do; ``"auto"`` is the CPU too, as it is the only one."""
+    if device in ("cpu", "auto"):
+        return "cpu"
+    if device == "gpu":
+        raise GpuUnavailable("device: this build detects collisions on the CPU only; use \"cpu\" or \"auto\"")
+    raise InvalidInput(
+        f'device: expected one of "cpu", "auto", got {device!r}',
+        name="device",
+        expected='one of "cpu", "auto"',
+        got=repr(device),
+    )
+
+
+def check_threads(threads: int | None) -> int | None:
+    """Refuse what is no number of threads."""
+    if threads is None:
+        return None
+    try:
+        count = operator.index(threads)
+    except TypeError:
+        count = 0
+    if count < 1 or isinstance(threads, bool):
+        raise InvalidInput(
+            f"threads: expected a whole number ≥ 1, got {threads!r}",
+            name="threads",
+            expected="a whole number ≥ 1",
+            got=repr(threads),
+        )
+    return count

@@ -1,0 +1,61 @@
+"""Mesh files: one module per format, each giving plain arrays (vertices, triangles, UV per triangle corner)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from clothsim._arrays import Floats, Ints
+from clothsim.errors import MeshError
+
+__all__ = ["READABLE", "WRITABLE", "RawMesh", "read", "write"]
+
+READABLE = (".obj", ".ply", ".stl", ".gltf", ".glb")
+WRITABLE = (".obj", ".ply")
+
+
+class RawMesh(NamedTuple):
+    """What a file holds: positions (n, 3), triangles (m, 3) and UV per corner (m, 3, 2) if every corner has one."""
+
+    vertices: Floats
+    triangles: Ints
+    uv: Floats | None
+
+
+def read(path: Path) -> RawMesh:
+    """Read ``path`` by its suffix; a file that cannot be read or understood is a `MeshError` naming it."""
+    suffix = path.suffix.lower()
+    if suffix not in READABLE:
+        known = ", ".join(READABLE)
+        raise MeshError(f"{path}: expected a mesh file ({known}), got suffix {suffix!r}", kind="file")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise MeshError(f"{path}: cannot read the mesh: {reason}", kind="file") from error
+    if suffix == ".obj":
+        from clothsim._formats import obj
+
+        return obj.parse(content, str(path))
+    if suffix == ".ply":
+        from clothsim._formats import ply
+
+        return ply.parse(content, str(path))
+    from clothsim._formats import soup
+
+    return soup.load(path)
+
+
+def write(path: Path, mesh: RawMesh) -> bytes:
+    """Return the bytes of a file with the suffix of ``path``."""
+    suffix = path.suffix.lower()
+    if suffix == ".obj":
+        from clothsim._formats import obj
+
+        return obj.dump(mesh)
+    if suffix == ".ply":
+        from clothsim._formats import ply
+
+        return ply.dump(mesh)
+    known = ", ".join(WRITABLE)
+    raise MeshError(f"{path}: expected a suffix that can be written ({known}), got {suffix!r}", kind="file")

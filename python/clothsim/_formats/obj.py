@@ -1,0 +1,103 @@
+"""Wavefront OBJ.
+
+Read here rather than through trimesh, which splits vertices at UV seams: cloth would come apart along each seam.
+Vertices keep the file's order, polygons are triangulated in place, and UV is kept per corner.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import numpy as np
+
+from clothsim._arrays import Floats, Ints
+from clothsim._formats import RawMesh
+from clothsim._formats.polygons import triangulate
+from clothsim.errors import MeshError
+
+__all__ = ["dump", "parse"]
+
+
+def parse(content: bytes, name: str) -> RawMesh:
+    """Parse the text of an OBJ file; ``name`` is for messages. Groups, materials, normals, lines are passed over.
+
+    UV is given only if every corner of every face names one.
+    """
+    vertices: list[tuple[float, float, float]] = []
+    coordinates: list[tuple[float, float]] = []
+    faces: list[tuple[list[int], list[int]]] = []
+    text = content.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split()
+        if not words:
+            continue
+        try:
+            if words[0] == "v":
+                vertices.append((float(words[1]), float(words[2]), float(words[3])))
+            elif words[0] == "vt":
+                coordinates.append((float(words[1]), float(words[2]) if len(words) > 2 else 0.0))
+            elif words[0] == "f":
+                faces.append(_face(words[1:], len(vertices), len(coordinates)))
+        except (ValueError, IndexError) as error:
+            text = line.strip()
+            raise MeshError(f"{name}, line {number}: cannot understand {text!r} ({error})", kind="file") from error
+    if not faces:
+        raise MeshError(f"{name}: expected at least one face, got none", kind="empty")
+    points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
+    corners, uv_corners = _triangles(faces, points)
+    uv = None
+    if coordinates and min(map(min, uv_corners)) >= 0:
+        uv = np.array(coordinates, dtype=np.float64)[np.array(uv_corners)]
+    return RawMesh(points, np.array(corners, dtype=np.int64), uv)
+
+
+def _face(words: list[str], vertex_count: int, uv_count: int) -> tuple[list[int], list[int]]:
+    """Vertex and UV index (from 0; −1 for no UV) of each corner of an ``f`` line."""
+    if len(words) < 3:
+        raise ValueError(f"expected at least three corners, got {len(words)}")
+    corners, uv = [], []
+    for word in words:
+        parts = word.split("/")
+        corners.append(_index(parts[0], vertex_count, "vertex"))
+        uv.append(_index(parts[1], uv_count, "vt") if len(parts) > 1 and parts[1] else -1)
+    return corners, uv
+
+
+def _index(word: str, count: int, what: str) -> int:
+    """OBJ counts from 1, and backwards from the newest with negative numbers."""
+    value = int(word)
+    index = value - 1 if value > 0 else count + value
+    if value == 0 or not 0 <= index < count:
+        raise ValueError(f"{what} {value} does not exist: {count} are defined so far")
+    return index
+
+
+def _triangles(
+    faces: list[tuple[list[int], list[int]]], points: Floats
+) -> tuple[list[list[int]], list[list[int]]]:
+    corners: list[list[int]] = []
+    uv_corners: list[list[int]] = []
+    for face, uv in faces:
+        for local in [(0, 1, 2)] if len(face) == 3 else triangulate(points[face]):
+            corners.append([face[k] for k in local])
+            uv_corners.append([uv[k] for k in local])
+    return corners, uv_corners
+
+
+def dump(mesh: RawMesh) -> bytes:
+    """Text of an OBJ file; numbers read back to the same float64. Equal UV of corners are written once."""
+    out = BytesIO()
+    _rows(out, b"v ", mesh.vertices)
+    triangles: Ints = mesh.triangles + 1
+    if mesh.uv is None:
+        _rows(out, b"f ", triangles)
+        return out.getvalue()
+    coordinates, index = np.unique(mesh.uv.reshape(-1, 2), axis=0, return_inverse=True)
+    _rows(out, b"vt ", coordinates)
+    pairs = np.stack([triangles, index.reshape(-1, 3) + 1], axis=-1)
+    out.writelines(b"f " + b" ".join(b"%d/%d" % (v, t) for v, t in face) + b"\n" for face in pairs.tolist())
+    return out.getvalue()
+
+
+def _rows(out: BytesIO, prefix: bytes, rows: Floats | Ints) -> None:
+    out.writelines(prefix + " ".join(map(repr, row)).encode() + b"\n" for row in rows.tolist())

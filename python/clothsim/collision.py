@@ -1,0 +1,191 @@
+"""What touches what, on any pair of frames of one mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from numpy.typing import ArrayLike, NDArray
+
+from clothsim import _core
+from clothsim._arrays import Floats, Ints, floats, indices
+from clothsim._device import check_device, check_threads
+
+__all__ = ["Detection", "detect", "edge_edge_ccd", "self_intersections", "vertex_triangle_ccd"]
+
+Method = Literal["brute", "bvh"]
+Mode = Literal["continuous", "discrete"]
+
+
+@dataclass(frozen=True, eq=False)
+class Detection:
+    """Every pair in contact, each once and sorted.
+
+    Attributes
+    ----------
+    vertex_triangle : (k, 2) int64
+        Vertex, triangle.
+    time_vertex_triangle : (k,) float64
+        When they first are in contact, as a fraction of the step in [0, 1], never later than the true time.
+    edge_edge : (k, 4) int64
+        The vertices of the one edge, then of the other.
+    time_edge_edge : (k,) float64
+        As above.
+    stats : dict
+        Counts (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage.
+    """
+
+    vertex_triangle: Ints
+    time_vertex_triangle: Floats
+    edge_edge: Ints
+    time_edge_edge: Floats
+    stats: dict[str, Any]
+
+    def __repr__(self) -> str:
+        return f"Detection({len(self.vertex_triangle)} vertex-triangle, {len(self.edge_edge)} edge-edge)"
+
+
+def detect(
+    x_t0: ArrayLike,
+    x_t1: ArrayLike,
+    triangles: ArrayLike,
+    method: Method | str = "bvh",
+    mode: Mode | str = "continuous",
+    thickness: float = 0.0,
+    device: str = "cpu",
+    threads: int | None = None,
+) -> Detection:
+    """Find every vertex-triangle and edge-edge pair that shares no vertex and comes within ``thickness``.
+
+    Vertices move in straight lines from ``x_t0`` to ``x_t1``. No pair is missed: what cannot be decided counts as a
+    contact. The result has the same bits for any number of threads.
+
+    Parameters
+    ----------
+    x_t0, x_t1 : (n, 3) array of float64
+        Positions at both ends of the step [m].
+    triangles : (m, 3) array of int32 or int64
+        Vertex indices.
+    method : {"bvh", "brute"}
+        ``"bvh"``: a tree of boxes. ``"brute"``: every pair, the oracle; for small meshes.
+    mode : {"continuous", "discrete"}
+        The motion, or the end positions ``x_t1`` alone.
+    thickness : float
+        Distance up to which two features are in contact [m], ≥ 0.
+    device : {"cpu", "auto"}
+        Where to compute.
+    threads : int, optional
+        How many threads; all of the machine's by default.
+
+    Returns
+    -------
+    Detection
+
+    Raises
+    ------
+    InvalidInput
+        An argument is not what it should be.
+    GpuUnavailable
+        ``device="gpu"``: this build detects on the CPU only.
+
+    Examples
+    --------
+    A vertex falls through a triangle, reaching it half-way:
+
+    >>> import clothsim as cs
+    >>> x_t0 = [[0, 0, 0], [1, 0, 0], [0, 0, 1], [0.2, 1, 0.2], [1.2, 1, 0.2], [0.2, 1, 1.2]]
+    >>> x_t1 = [[0, 0, 0], [1, 0, 0], [0, 0, 1], [0.2, -1, 0.2], [1.2, 1, 0.2], [0.2, 1, 1.2]]
+    >>> d = cs.collision.detect(x_t0, x_t1, [[0, 1, 2], [3, 4, 5]])
+    >>> d.vertex_triangle.tolist()
+    [[3, 0]]
+    >>> round(float(d.time_vertex_triangle[0]), 6)
+    0.5
+    """
+    check_device(device)
+    return Detection(
+        *_core.detect(
+            floats(x_t0, "x_t0", "shape (n, 3)"),
+            floats(x_t1, "x_t1", "shape (n, 3)"),
+            indices(triangles, "triangles"),
+            str(method),
+            str(mode),
+            float(thickness),
+            check_threads(threads),
+        )
+    )
+
+
+def vertex_triangle_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDArray[Any], Floats]:
+    """Say for each query whether a moving vertex and a moving triangle come within ``thickness``, and when first.
+
+    Parameters
+    ----------
+    queries : (n, 8, 3) array of float64
+        Positions [m] of the vertex and the triangle's corners at t0, then the same four at t1.
+    thickness : float
+        Distance that counts as contact [m], ≥ 0.
+
+    Returns
+    -------
+    hit : (n,) bool
+        False only where there certainly is no contact.
+    time : (n,) float64
+        Fraction of the step in [0, 1], never later than the true first time; infinity where there is no contact.
+
+    Examples
+    --------
+    >>> import clothsim as cs
+    >>> still = [[0, 0, 0], [1, 0, 0], [0, 0, 1]]
+    >>> cs.collision.vertex_triangle_ccd([[[0.2, 1, 0.2], *still, [0.2, 0.5, 0.2], *still]])[0].tolist()
+    [False]
+    """
+    return _core.vertex_triangle_ccd(floats(queries, "queries", "shape (n, 8, 3)"), float(thickness))
+
+
+def edge_edge_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDArray[Any], Floats]:
+    """Say for each query whether two moving edges come within ``thickness``, and when first.
+
+    Parameters
+    ----------
+    queries : (n, 8, 3) array of float64
+        Positions [m] of the ends of the one edge and of the other at t0, then the same four at t1.
+    thickness : float
+        Distance that counts as contact [m], ≥ 0.
+
+    Returns
+    -------
+    hit : (n,) bool
+        False only where there certainly is no contact.
+    time : (n,) float64
+        Fraction of the step in [0, 1], never later than the true first time; infinity where there is no contact.
+    """
+    return _core.edge_edge_ccd(floats(queries, "queries", "shape (n, 8, 3)"), float(thickness))
+
+
+def self_intersections(x: ArrayLike, triangles: ArrayLike, *, threads: int | None = None) -> Ints:
+    """Find the pairs of triangles that pass through each other.
+
+    Parameters
+    ----------
+    x : (n, 3) array of float64
+        Positions [m].
+    triangles : (m, 3) array of int32 or int64
+        Vertex indices.
+    threads : int, optional
+        How many threads; all of the machine's by default.
+
+    Returns
+    -------
+    (k, 2) int64
+        Triangles, the lower index first, sorted.
+
+    Examples
+    --------
+    >>> import clothsim as cs
+    >>> x = [[0, 0, 0], [2, 0, 0], [0, 0, 2], [0.5, -1, 0.5], [0.5, 1, 0.5], [0.6, 1, 0.5]]
+    >>> cs.collision.self_intersections(x, [[0, 1, 2], [3, 4, 5]]).tolist()
+    [[0, 1]]
+    """
+    return _core.self_intersections(
+        floats(x, "x", "shape (n, 3)"), indices(triangles, "triangles"), check_threads(threads)
+    )
