@@ -5,10 +5,20 @@
 
 pub use cloth_collision as collision;
 
+mod collisions;
 mod error;
+mod frames;
+mod friction;
+mod hold;
+mod impulse;
 mod info;
+mod motion;
 mod params;
+mod repulsion;
 mod respond;
+mod rigid_motion;
+mod sweeps;
+mod zones;
 
 pub use error::ResponseError;
 pub use info::ResponseInfo;

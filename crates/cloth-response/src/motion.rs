@@ -1,0 +1,98 @@
+//! The step's motion while the stages work on it.
+
+use crate::Vec3;
+
+/// Straight motion `x_t0` → `end` of every vertex, with its average velocity.
+///
+/// Stages change velocities (impulses) or ends (zones, hold) and list what moved; the lists say which pairs a
+/// detection has to look at again.
+pub(crate) struct Motion<'a> {
+    /// 1/m [1/kg]; 0 for prescribed vertices.
+    pub(crate) inv_mass: &'a [f64],
+    pub(crate) x_t0: &'a [Vec3],
+    pub(crate) dt: f64,
+    pub(crate) buffers: &'a mut MotionBuffers,
+}
+
+/// The arrays of a [`Motion`], reused from step to step.
+#[derive(Default)]
+pub(crate) struct MotionBuffers {
+    /// Positions at the end of the step [m].
+    pub(crate) end: Vec<Vec3>,
+    /// Average velocity over the step [m/s].
+    pub(crate) velocity: Vec<Vec3>,
+    /// Average velocity before any response [m/s].
+    pub(crate) velocity_start: Vec<Vec3>,
+    /// Tick of each vertex's last change by an impulse.
+    pub(crate) touched: Vec<u32>,
+    /// Ends changed since the last detection.
+    pub(crate) changed: Vec<bool>,
+    tick: u32,
+    written: u32,
+}
+
+impl<'a> Motion<'a> {
+    pub(crate) fn new(
+        buffers: &'a mut MotionBuffers,
+        inv_mass: &'a [f64],
+        x_t0: &'a [Vec3],
+        x_t1: &[Vec3],
+        dt: f64,
+    ) -> Self {
+        let MotionBuffers { end, velocity, velocity_start, touched, changed, tick, written } = buffers;
+        end.clear();
+        end.extend_from_slice(x_t1);
+        velocity.clear();
+        velocity.extend(x_t0.iter().zip(x_t1).map(|(a, b)| (b - a) / dt));
+        velocity_start.clone_from(velocity);
+        touched.clear();
+        touched.resize(x_t0.len(), 0);
+        changed.clear();
+        changed.resize(x_t0.len(), false);
+        (*tick, *written) = (0, 0);
+        Self { inv_mass, x_t0, dt, buffers }
+    }
+
+    /// The next tick: later than all changes so far.
+    pub(crate) fn tick(&mut self) -> u32 {
+        self.buffers.tick += 1;
+        self.buffers.tick
+    }
+
+    /// Moves the ends of the vertices that impulses changed since the last call, and marks them.
+    pub(crate) fn write_ends(&mut self) -> usize {
+        let buffers = &mut *self.buffers;
+        let mut count = 0;
+        for i in 0..buffers.end.len() {
+            if buffers.touched[i] > buffers.written {
+                buffers.end[i] = self.x_t0[i] + buffers.velocity[i] * self.dt;
+                buffers.changed[i] = true;
+                count += 1;
+            }
+        }
+        buffers.written = buffers.tick;
+        count
+    }
+
+    /// Moves one end and marks it; no change is no mark.
+    pub(crate) fn set_end(&mut self, vertex: u32, end: Vec3) -> bool {
+        let i = vertex as usize;
+        if self.buffers.end[i] == end {
+            return false;
+        }
+        self.buffers.end[i] = end;
+        self.buffers.velocity[i] = (end - self.x_t0[i]) / self.dt;
+        self.buffers.changed[i] = true;
+        true
+    }
+
+    /// Forgets the marks.
+    pub(crate) fn clear_changed(&mut self) {
+        self.buffers.changed.fill(false);
+    }
+
+    /// Whether the vertex's motion is prescribed.
+    pub(crate) fn prescribed(&self, vertex: u32) -> bool {
+        self.inv_mass[vertex as usize] == 0.0
+    }
+}
