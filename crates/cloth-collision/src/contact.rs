@@ -91,10 +91,10 @@ pub struct Contacts {
 /// Counts and seconds of one call.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DetectStats {
-    /// Pairs of bounding boxes compared (nodes and triangles).
+    /// Pairs of tree nodes compared.
     pub broad_phase_tests: u64,
-    /// Pairs of triangles whose features were paired.
-    pub triangle_pairs: u64,
+    /// Pairs of leaves whose features were paired.
+    pub leaf_pairs: u64,
     /// Admissible vertex-triangle pairs handed to the narrow phase.
     pub candidates_vertex_triangle: u64,
     /// Admissible edge-edge pairs handed to the narrow phase.

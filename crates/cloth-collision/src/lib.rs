@@ -13,6 +13,7 @@ pub mod ccd;
 pub mod distance;
 pub mod shapes;
 
+mod bounds;
 mod brute;
 mod bvh;
 mod collision_mesh;
@@ -20,6 +21,7 @@ mod contact;
 mod detector;
 mod error;
 mod intersect;
+mod proximity;
 mod stencil;
 
 pub use brute::BruteForce;

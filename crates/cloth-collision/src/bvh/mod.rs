@@ -1,13 +1,54 @@
 //! Bounding volume hierarchy of fixed topology over the scene's triangles.
+//!
+//! [`build`] splits once; [`refit`] follows the motion with boxes at both ends of the step; [`traverse`] meets the
+//! tree with itself and [`leaf_pair`] the features of two leaves, each feature from the one triangle that owns it;
+//! [`narrow`] decides what they yield while it streams by.
 
-use crate::contact::{check_active, check_positions, check_thickness};
-use crate::distance::{edge_edge, vertex_triangle};
-use crate::{BruteForce, CollisionMesh, Contacts, DetectError, Detector, Query, Stencil, StencilKind, Vec3};
+mod build;
+mod leaf_pair;
+mod narrow;
+mod refit;
+mod traverse;
+mod validate;
+
+use crate::bounds::LANES;
+use crate::contact::check_positions;
+use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
+use build::Tree;
+use refit::Boxes;
+use std::time::Instant;
+
+/// Triangles of a full leaf: one block.
+const LEAF_TRIANGLES: usize = LANES;
+
+/// One node of the tree, in preorder: the left child is the next node.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// Right child, [`NONE`] in a leaf.
+    right: u32,
+    /// Leaf index, [`NONE`] in an inner node.
+    leaf: u32,
+    /// The body of all triangles below, [`NONE`] if there are several.
+    body: u32,
+}
+
+/// A leaf: its node and the ranges of its feature blocks.
+#[derive(Debug, Clone, Copy)]
+struct Leaf {
+    node: u32,
+    vertex_blocks: [u32; 2],
+    edge_blocks: [u32; 2],
+}
 
 /// A hierarchy built once per topology and refitted in every call.
+///
+/// The tree shape comes from the positions at the build; answers never depend on it.
 #[derive(Debug, Clone)]
 pub struct Bvh {
+    vertex_count: usize,
     triangle_count: usize,
+    tree: Tree,
+    boxes: Boxes,
 }
 
 impl Bvh {
@@ -17,72 +58,25 @@ impl Bvh {
     /// [`DetectError::Length`] and [`DetectError::NotFinite`] for `x`.
     pub fn new(mesh: &CollisionMesh, x: &[Vec3]) -> Result<Self, DetectError> {
         check_positions("x", x, mesh.vertex_count)?;
-        Ok(Self { triangle_count: mesh.triangles.len() })
+        Ok(Self {
+            vertex_count: mesh.vertex_count,
+            triangle_count: mesh.triangles.len(),
+            tree: build::build(mesh, x),
+            boxes: Boxes::default(),
+        })
     }
 
-    /// All pairs within `thickness` \[m\] at `x` \[m\], with closest points.
-    ///
-    /// # Errors
-    /// As [`Detector::detect`].
-    pub fn proximity(
-        &mut self,
-        mesh: &CollisionMesh,
-        x: &[Vec3],
-        thickness: f64,
-        active: Option<&[bool]>,
-        _pool: &rayon::ThreadPool,
-    ) -> Result<Vec<Stencil>, DetectError> {
-        check_thickness(thickness)?;
-        check_positions("x", x, mesh.vertex_count)?;
-        check_active(active, mesh.vertex_count)?;
-        let is_active = |vertices: &[u32]| active.is_none_or(|m| vertices.iter().any(|&v| m[v as usize]));
-        let mut out = Vec::new();
-        for v in 0..mesh.vertex_count as u32 {
-            if mesh.vertex_owner[v as usize] == cloth_mesh::NONE {
-                continue;
-            }
-            for (t, &[a, b, c]) in mesh.triangles.iter().enumerate() {
-                if !mesh.vertex_triangle_admissible(v, t as u32) || !is_active(&[v, a, b, c]) {
-                    continue;
-                }
-                let p = [v, a, b, c].map(|k| x[k as usize]);
-                let w = vertex_triangle::closest_point(&p);
-                let s = Stencil::from_weights(
-                    StencilKind::VertexTriangle,
-                    [v, a, b, c],
-                    [1.0, -w[0], -w[1], -w[2]],
-                    &p,
-                    None,
-                );
-                if s.distance <= thickness {
-                    out.push(s);
-                }
-            }
+    fn check_mesh(&self, mesh: &CollisionMesh) -> Result<(), DetectError> {
+        if mesh.triangles.len() == self.triangle_count && mesh.vertex_count == self.vertex_count {
+            return Ok(());
         }
-        for i in 0..mesh.edges.len() {
-            for j in i + 1..mesh.edges.len() {
-                let ([a0, a1], [b0, b1]) = (mesh.edges[i], mesh.edges[j]);
-                if !mesh.edge_edge_admissible(i as u32, j as u32) || !is_active(&[a0, a1, b0, b1]) {
-                    continue;
-                }
-                let p = [a0, a1, b0, b1].map(|k| x[k as usize]);
-                let (s, t) = edge_edge::closest_points(&p);
-                if s <= 0.0 || s >= 1.0 || t <= 0.0 || t >= 1.0 {
-                    continue;
-                }
-                let s = Stencil::from_weights(
-                    StencilKind::EdgeEdge,
-                    [a0, a1, b0, b1],
-                    [1.0 - s, s, t - 1.0, -t],
-                    &p,
-                    None,
-                );
-                if s.distance <= thickness {
-                    out.push(s);
-                }
-            }
-        }
-        Ok(out)
+        Err(DetectError::OtherMesh { expected: self.triangle_count, got: mesh.triangles.len() })
+    }
+
+    fn refit(&mut self, mesh: &CollisionMesh, query: &Query<'_>, pool: &rayon::ThreadPool) {
+        let start = if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 };
+        // Two boxes meet: half the thickness each.
+        self.boxes.refit(&self.tree, mesh, start, query.x_t1, 0.5 * query.thickness, query.active, pool);
     }
 }
 
@@ -97,9 +91,21 @@ impl Detector for Bvh {
         query: &Query<'_>,
         pool: &rayon::ThreadPool,
     ) -> Result<Contacts, DetectError> {
-        if mesh.triangles.len() != self.triangle_count {
-            return Err(DetectError::OtherMesh { expected: self.triangle_count, got: mesh.triangles.len() });
-        }
-        BruteForce.detect(mesh, query, pool)
+        query.check(mesh)?;
+        self.check_mesh(mesh)?;
+        let start = Instant::now();
+        self.refit(mesh, query, pool);
+        let fitted = Instant::now();
+        let (sinks, counts) = self.traverse(mesh, pool, || narrow::Narrow::new(mesh, query));
+        let traversed = Instant::now();
+        let mut out = narrow::merge(sinks);
+        out.stats.broad_phase_tests = counts.box_tests;
+        out.stats.leaf_pairs = counts.leaf_pairs;
+        out.stats.seconds = vec![
+            ("refit", (fitted - start).as_secs_f64()),
+            ("traversal and narrow phase", (traversed - fitted).as_secs_f64()),
+            ("merge", traversed.elapsed().as_secs_f64()),
+        ];
+        Ok(out)
     }
 }

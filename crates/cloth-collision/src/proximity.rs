@@ -1,0 +1,1 @@
+//! Pairs within a distance, with their closest points.
