@@ -21,7 +21,6 @@ mod contact;
 mod detector;
 mod error;
 mod intersect;
-mod proximity;
 mod stencil;
 
 pub use brute::BruteForce;

@@ -35,20 +35,11 @@ const DIRECTION_FLOOR: f64 = 1e-11;
 const LOOK_BACK: [f64; 5] = [0.0, 1e-6, 1e-4, 1e-2, 1.0];
 
 impl Stencil {
-    pub(crate) fn from_weights(
-        kind: StencilKind,
-        vertices: [u32; 4],
-        weights: [f64; 4],
-        p: &[Vec3; 4],
-        fallback: Option<Vec3>,
-    ) -> Self {
+    /// The stencil of these weights at the points `p`; its normal is r, or the plane's where r is rounding noise.
+    pub(crate) fn new(kind: StencilKind, vertices: [u32; 4], weights: [f64; 4], p: &[Vec3; 4]) -> Self {
         let r = separation(p, &weights);
         let distance = r.norm();
-        let normal = if distance > DIRECTION_FLOOR * size(p) {
-            r / distance
-        } else {
-            fallback.unwrap_or_else(|| plane_normal(kind, p))
-        };
+        let normal = if distance > DIRECTION_FLOOR * size(p) { r / distance } else { plane_normal(kind, p) };
         Self { kind, vertices, weights, normal, distance }
     }
 }
@@ -159,5 +150,5 @@ fn at_contact(kind: StencilKind, vertices: [u32; 4], time: f64, x_t0: &[Vec3], x
     if separation(&motion, &weights).dot(&normal) > 0.0 {
         normal = -normal;
     }
-    Stencil::from_weights(kind, vertices, weights, &now, Some(normal))
+    Stencil { kind, vertices, weights, normal, distance: separation(&now, &weights).norm() }
 }

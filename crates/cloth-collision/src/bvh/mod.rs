@@ -7,6 +7,7 @@
 mod build;
 mod leaf_pair;
 mod narrow;
+mod proximity;
 mod refit;
 mod traverse;
 mod validate;

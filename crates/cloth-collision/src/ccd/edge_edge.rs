@@ -2,7 +2,7 @@
 
 use super::cubic::Cubic;
 use super::separation::Relative;
-use super::{INSIDE_MARGIN, Motion};
+use super::{INSIDE_MARGIN, Motion, TOUCHING};
 use crate::Vec3;
 use crate::distance::edge_edge::closest_points;
 
@@ -51,7 +51,9 @@ impl Motion<4> for EdgeEdgeMotion {
         let r = self.relative.at(t)[0];
         let n = u.cross(&v);
         let n2 = n.norm_squared();
-        if n2 <= INSIDE_MARGIN * u.norm_squared() * v.norm_squared() {
+        if n2 <= INSIDE_MARGIN * u.norm_squared() * v.norm_squared()
+            || n.dot(&r).powi(2) > TOUCHING * TOUCHING * n2
+        {
             return false;
         }
         let (s, q) = (v.cross(&r).dot(&n) / n2, u.cross(&r).dot(&n) / n2);

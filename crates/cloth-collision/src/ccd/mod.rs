@@ -30,9 +30,11 @@ const MIN_PROGRESS: f64 = 1e-9;
 /// Marches end at a contact after so many steps. Transversal contacts need about three; coplanar motion and
 /// contacts at a thickness converge linearly.
 const MAX_STEPS: usize = 512;
-/// A weight above this says "inside" without a search for a separating direction. It can only add contacts, at a
-/// distance below the rounding error of the cubic.
+/// Weights above this and a distance below [`TOUCHING`] say "contact" without a search for a separating direction.
+/// That can only add contacts.
 const INSIDE_MARGIN: f64 = 1e-6;
+/// Distance, in units of the pair's extent; at a transversal root [`cubic::Cubic::first_root_bound`] comes as close.
+const TOUCHING: f64 = 1e-9;
 
 /// What a stencil gives to the march.
 trait Motion<const K: usize> {
@@ -41,7 +43,7 @@ trait Motion<const K: usize> {
     fn scale(&mut self, factor: f64);
     /// det = 0 where the four points are coplanar.
     fn cubic(&self) -> Cubic;
-    /// Whether the lines or the plane, if they meet at t, meet well inside both features. No certificate.
+    /// Whether the features all but touch at t, well inside both. No certificate.
     fn is_inside(&self, t: f64) -> bool;
     /// Directions along which the features may be apart at t. No certificate.
     fn directions(&self, t: f64, visit: impl FnMut(Vec3));

@@ -2,7 +2,7 @@
 
 use super::cubic::Cubic;
 use super::separation::Relative;
-use super::{INSIDE_MARGIN, Motion};
+use super::{INSIDE_MARGIN, Motion, TOUCHING};
 use crate::Vec3;
 use crate::distance::vertex_triangle::closest_point;
 
@@ -38,6 +38,9 @@ impl Motion<3> for VertexTriangleMotion {
     fn is_inside(&self, t: f64) -> bool {
         let [a, b, c] = self.0.at(t);
         let n = (b - a).cross(&(c - a));
+        if n.dot(&a).abs() > TOUCHING * n.norm() {
+            return false;
+        }
         let w = [b.cross(&c).dot(&n), c.cross(&a).dot(&n), a.cross(&b).dot(&n)];
         let margin = INSIDE_MARGIN * (w[0] + w[1] + w[2]);
         w.iter().all(|&w| w > margin)

@@ -1,1 +1,0 @@
-//! Pairs within a distance, with their closest points.
