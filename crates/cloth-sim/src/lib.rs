@@ -1,1 +1,36 @@
-//! Scene, effect plan, step loop, reports, checkpoints and frames.
+//! Scene, effect plan, step loop, reports, checkpoints: the engine as one object.
+//!
+//! A [`Scene`] says what there is; a [`Simulation`] is built from it and from the [`Assets`] that it names, holds the
+//! state and steps it. The [`Plan`] says beforehand which effects run and why, the [`Report`] afterwards what each
+//! cost.
+//!
+//! One global vertex array: the vertices of all cloth in scene order, then those of all colliders. Prescribed vertices
+//! (colliders, pins) have a known end of each step and infinite mass.
+
+pub use cloth_collision as collision;
+pub use cloth_core as core;
+pub use cloth_response as response;
+
+pub mod scene;
+
+mod assets;
+mod bodies;
+mod checkpoint;
+mod error;
+mod guard;
+mod motion;
+mod pins;
+mod plan;
+mod report;
+mod simulation;
+mod step;
+
+pub use assets::{Assets, Sequence};
+pub use bodies::{BodyInfo, BodyKind};
+pub use error::SimError;
+pub use plan::{Effect, Plan};
+pub use report::{ContactReport, EffectCost, Report, StepReport, Totals};
+pub use scene::{Scene, SceneError};
+pub use simulation::{Advance, Simulation, SimulationOptions};
+
+use cloth_core::mesh::Vec3;

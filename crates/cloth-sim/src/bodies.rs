@@ -1,0 +1,271 @@
+//! From the scene and its assets to checked meshes in place.
+
+use crate::motion::Motion;
+use crate::scene::{Cloth, Collider, DiagonalPattern, Generator, MeshSource, RestSource};
+use crate::{Assets, Scene, SceneError, Vec3};
+use cloth_collision::{DetectError, shapes};
+use cloth_core::Material;
+use cloth_core::mesh::{MeshError, RestShape, Topology, TriMesh, generators};
+use std::ops::Range;
+
+/// What a body is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BodyKind {
+    /// Moves by forces.
+    Cloth,
+    /// Moves as prescribed.
+    Collider,
+}
+
+/// A body of the simulation, as output needs it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyInfo {
+    /// Its name in the scene.
+    pub name: String,
+    /// Cloth or collider.
+    pub kind: BodyKind,
+    /// Its vertices in the global array (cloth first, so that a cloth's range also indexes `positions()`).
+    pub vertices: Range<usize>,
+    /// Its triangles, with indices into its own vertices.
+    pub triangles: Vec<[u32; 3]>,
+    /// Material coordinates per triangle corner [m], if the mesh has them.
+    pub uv: Option<Vec<[[f64; 2]; 3]>>,
+}
+
+/// A piece of cloth, ready to be built.
+pub(crate) struct ClothBody {
+    pub(crate) mesh: TriMesh,
+    pub(crate) topology: Topology,
+    pub(crate) rest: RestShape,
+    pub(crate) material: Material,
+    pub(crate) first_vertex: usize,
+    /// Start positions [m] and velocities [m/s], before pins.
+    pub(crate) x: Vec<Vec3>,
+    pub(crate) v: Vec<Vec3>,
+}
+
+/// A collider: triangles and how its vertices move.
+pub(crate) struct ColliderBody {
+    pub(crate) triangles: Vec<[u32; 3]>,
+    pub(crate) uv: Option<Vec<[[f64; 2]; 3]>>,
+    pub(crate) first_vertex: usize,
+    pub(crate) motion: Motion,
+}
+
+/// All bodies of a scene, cloth first.
+pub(crate) struct Bodies {
+    pub(crate) cloth: Vec<ClothBody>,
+    pub(crate) colliders: Vec<ColliderBody>,
+    pub(crate) cloth_vertices: usize,
+    pub(crate) vertices: usize,
+}
+
+impl Bodies {
+    /// Loads, checks and places the meshes of a checked scene.
+    pub(crate) fn new(scene: &Scene, assets: &Assets) -> Result<Self, SceneError> {
+        let mut next = 0;
+        let mut cloth = Vec::with_capacity(scene.cloth.len());
+        for (i, source) in scene.cloth.iter().enumerate() {
+            let body = cloth_body(scene, assets, source, &format!("cloth[{i}]"), next)?;
+            next += body.x.len();
+            cloth.push(body);
+        }
+        let cloth_vertices = next;
+        let mut colliders = Vec::with_capacity(scene.collider.len());
+        for (i, source) in scene.collider.iter().enumerate() {
+            let body = collider_body(scene, assets, source, &format!("collider[{i}]"), next)?;
+            next += body.motion.vertex_count();
+            colliders.push(body);
+        }
+        Ok(Self { cloth, colliders, cloth_vertices, vertices: next })
+    }
+
+    pub(crate) fn infos(&self, scene: &Scene) -> Vec<BodyInfo> {
+        let cloth = self.cloth.iter().zip(&scene.cloth).map(|(body, source)| BodyInfo {
+            name: source.name.clone(),
+            kind: BodyKind::Cloth,
+            vertices: body.first_vertex..body.first_vertex + body.x.len(),
+            triangles: body.mesh.triangles.clone(),
+            uv: body.mesh.uv.clone(),
+        });
+        let colliders = self.colliders.iter().zip(&scene.collider).map(|(body, source)| BodyInfo {
+            name: source.name.clone(),
+            kind: BodyKind::Collider,
+            vertices: body.first_vertex..body.first_vertex + body.motion.vertex_count(),
+            triangles: body.triangles.clone(),
+            uv: body.uv.clone(),
+        });
+        cloth.chain(colliders).collect()
+    }
+}
+
+fn cloth_body(
+    scene: &Scene,
+    assets: &Assets,
+    source: &Cloth,
+    key: &str,
+    first_vertex: usize,
+) -> Result<ClothBody, SceneError> {
+    let mesh_key = format!("{key}.mesh");
+    let mesh = load(scene, assets, &source.mesh, &mesh_key)?;
+    let defect = |error: MeshError| mesh_error(scene, &mesh_key, &source.name, &error);
+    mesh.check().map_err(defect)?;
+    let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
+    let material = scene.resolve_material(source, key)?;
+    if !matches!(material.bending, cloth_core::Bending::None) {
+        topology.require_manifold().map_err(defect)?;
+    }
+    let rest = match (source.rest, &mesh.uv) {
+        (RestSource::Mesh, _) => RestShape::from_positions(&mesh, Vec3::from(source.warp)),
+        (RestSource::Uv, Some(uv)) => RestShape::from_uv(uv),
+        (RestSource::Uv, None) => {
+            let expected = format!("a mesh with UV (\"{}\" takes its rest shape from it)", source.name);
+            return Err(scene.error(&format!("{key}.rest"), expected, "a mesh without"));
+        }
+    }
+    .map_err(defect)?;
+    let pose = crate::motion::pose(source.position, source.rotation.as_ref());
+    let x: Vec<Vec3> = mesh.vertices.iter().map(|p| pose.transform_point(&(*p).into()).coords).collect();
+    let mut v = vec![Vec3::from(source.velocity); x.len()];
+    if let Some(name) = &source.velocities {
+        let key = format!("{key}.velocities");
+        let list = assets
+            .velocities
+            .get(name)
+            .ok_or_else(|| missing(scene, &key, name, "start velocities", assets.velocities.keys()))?;
+        if list.len() != v.len() {
+            let expected = format!("one velocity per vertex ({})", v.len());
+            return Err(scene.error(&key, expected, list.len().to_string()));
+        }
+        if let Some(i) = list.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+            return Err(scene.error(&key, "finite velocities [m/s]", format!("{:?} at vertex {i}", list[i])));
+        }
+        for (own, more) in v.iter_mut().zip(list) {
+            *own += more;
+        }
+    }
+    Ok(ClothBody { mesh, topology, rest, material, first_vertex, x, v })
+}
+
+fn collider_body(
+    scene: &Scene,
+    assets: &Assets,
+    source: &Collider,
+    key: &str,
+    first_vertex: usize,
+) -> Result<ColliderBody, SceneError> {
+    if let Some(sequence) = &source.sequence {
+        let name = sequence.file.as_ref().or(sequence.asset.as_ref()).cloned().unwrap_or_default();
+        let key = format!("{key}.sequence");
+        let asset = assets
+            .sequences
+            .get(&name)
+            .ok_or_else(|| missing(scene, &key, &name, "animated mesh", assets.sequences.keys()))?;
+        let Some(first) = asset.frames.first() else {
+            return Err(scene.error(&key, format!("frames (\"{}\")", source.name), "none"));
+        };
+        for (f, frame) in asset.frames.iter().enumerate() {
+            if frame.len() != first.len() {
+                let expected = format!("{} vertices in every frame (\"{}\")", first.len(), source.name);
+                return Err(scene.error(&key, expected, format!("{} in frame {f}", frame.len())));
+            }
+            if let Some(i) = frame.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+                let expected = format!("finite coordinates (\"{}\")", source.name);
+                return Err(scene.error(&key, expected, format!("{:?} at frame {f}, vertex {i}", frame[i])));
+            }
+        }
+        let mesh = TriMesh { vertices: first.clone(), triangles: asset.triangles.clone(), uv: None };
+        mesh.check().map_err(|error| mesh_error(scene, &key, &source.name, &error))?;
+        let motion = Motion::sequence(asset, sequence, source);
+        return Ok(ColliderBody { triangles: mesh.triangles, uv: None, first_vertex, motion });
+    }
+    let mesh = if let Some(shape) = &source.shape {
+        let (shape, tolerance) = shape.parts();
+        shapes::tessellate(&shape, tolerance).map_err(|error| match error {
+            DetectError::Parameter { parameter, expected, got } => {
+                scene.error(&format!("{key}.shape.{parameter}"), expected, format!("{got}"))
+            }
+            other => scene.error(&format!("{key}.shape"), "a shape", other.to_string()),
+        })?
+    } else {
+        let mesh_key = format!("{key}.mesh");
+        let Some(mesh) = &source.mesh else {
+            return Err(scene.error(key, "exactly one of shape, mesh, sequence", "none"));
+        };
+        let mesh = load(scene, assets, mesh, &mesh_key)?;
+        mesh.check().map_err(|error| mesh_error(scene, &mesh_key, &source.name, &error))?;
+        mesh
+    };
+    let motion = Motion::rigid(&mesh.vertices, source);
+    Ok(ColliderBody { triangles: mesh.triangles, uv: mesh.uv, first_vertex, motion })
+}
+
+fn load(scene: &Scene, assets: &Assets, source: &MeshSource, key: &str) -> Result<TriMesh, SceneError> {
+    let (name, key) = match source {
+        MeshSource::Generated(generator) => {
+            return generate(generator).map_err(|error| match error {
+                MeshError::Parameter { parameter, expected, got } => {
+                    scene.error(&format!("{key}.{parameter}"), expected, format!("{got}"))
+                }
+                other => scene.error(key, "a mesh", other.to_string()),
+            });
+        }
+        MeshSource::File(file) => (&file.file, format!("{key}.file")),
+        MeshSource::Asset(asset) => (&asset.asset, format!("{key}.asset")),
+    };
+    assets.meshes.get(name).cloned().ok_or_else(|| missing(scene, &key, name, "mesh", assets.meshes.keys()))
+}
+
+fn missing<'a>(
+    scene: &Scene,
+    key: &str,
+    name: &str,
+    what: &str,
+    known: impl Iterator<Item = &'a String>,
+) -> SceneError {
+    let known: Vec<&str> = known.map(String::as_str).collect();
+    let expected = if known.is_empty() {
+        format!("a loaded {what} (none was given)")
+    } else {
+        format!("a loaded {what}, one of {known:?}")
+    };
+    scene.error(key, expected, format!("\"{name}\"")).with_nearest(name, known.into_iter())
+}
+
+/// A mesh's defect under the name of its body.
+fn mesh_error(scene: &Scene, key: &str, name: &str, error: &MeshError) -> SceneError {
+    let text = error.to_string();
+    // MeshError's text is "array: expected …, got or named element".
+    let (expected, got) = match text.split_once(": expected ").map(|(_, rest)| rest.split_once(", ")) {
+        Some(Some((expected, got))) => (expected, got.strip_prefix("got ").unwrap_or(got)),
+        _ => ("a sound mesh", text.as_str()),
+    };
+    scene.error(key, format!("{expected} (\"{name}\")"), got)
+}
+
+fn generate(generator: &Generator) -> Result<TriMesh, MeshError> {
+    match *generator {
+        Generator::Grid { width, height, nx, ny, diagonals } => {
+            let diagonals = match diagonals {
+                DiagonalPattern::Alternating => generators::Diagonals::Alternating,
+                DiagonalPattern::OneWay => generators::Diagonals::OneWay,
+                DiagonalPattern::Crossed => generators::Diagonals::Crossed,
+            };
+            generators::grid_with(width, height, nx, ny, diagonals)
+        }
+        Generator::Disc { radius, rings } => generators::disc(radius, rings),
+        Generator::Ribbon { length, width, nx, ny, twist } => {
+            generators::ribbon(length, width, nx, ny, twist)
+        }
+        Generator::Cylinder { radius, height, segments, rows, caps } => {
+            generators::cylinder(radius, height, segments, rows, caps)
+        }
+        Generator::Sphere { radius, subdivisions } => generators::sphere(radius, subdivisions),
+        Generator::Capsule { radius, half_height, segments, rings } => {
+            generators::capsule(radius, half_height, segments, rings)
+        }
+        Generator::Cone { radius, height, segments } => generators::cone(radius, height, segments),
+        Generator::Box { size, cells } => generators::cuboid(size, cells),
+    }
+}

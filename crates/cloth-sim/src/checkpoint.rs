@@ -1,0 +1,253 @@
+//! The whole simulation as bytes, and back to the same bits.
+//!
+//! Layout, little-endian: magic, version (u32), length of the payload (u64), payload, FNV-1a checksum of the payload (u64).
+//! Payload: scene (JSON), options, state, pending steps, assets, report (JSON).
+
+use crate::simulation::Pending;
+use crate::step::State;
+use crate::{Assets, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
+use cloth_core::mesh::TriMesh;
+use std::collections::BTreeMap;
+
+const MAGIC: [u8; 8] = *b"CLOTHSIM";
+const VERSION: u32 = 1;
+const HEADER: usize = MAGIC.len() + 4 + 8;
+
+impl Simulation {
+    /// Scene, assets, options and the full state as bytes: [`Simulation::resume`] goes on to the same bits.
+    pub fn checkpoint(&self) -> Vec<u8> {
+        let mut payload = Writer::default();
+        payload.text(&serde_json::to_string(&self.scene).unwrap_or_default());
+        payload.u64(self.options.threads.map_or(0, |n| n as u64));
+        payload.u64(u64::from(self.options.allow_intersections));
+        payload.f64(self.state.time);
+        payload.u64(self.state.step);
+        payload.points(&self.state.x);
+        payload.points(&self.state.v);
+        let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0 });
+        payload.u64(pending.steps);
+        payload.f64(pending.dt);
+        payload.assets(&self.assets);
+        payload.text(&serde_json::to_string(&self.report).unwrap_or_default());
+
+        let payload = payload.0;
+        let mut bytes = Vec::with_capacity(HEADER + payload.len() + 8);
+        bytes.extend(MAGIC);
+        bytes.extend(VERSION.to_le_bytes());
+        bytes.extend((payload.len() as u64).to_le_bytes());
+        bytes.extend(&payload);
+        bytes.extend(checksum(&payload).to_le_bytes());
+        bytes
+    }
+
+    /// The simulation that a checkpoint holds. `threads` replaces the number of threads (results do not depend on it).
+    ///
+    /// # Errors
+    /// [`SimError::InvalidCheckpoint`] for bytes that are no checkpoint, of another version, cut off or damaged.
+    pub fn resume(bytes: &[u8], threads: Option<usize>) -> Result<Self, SimError> {
+        let mut payload = Reader(open(bytes)?);
+        let scene = Scene::from_json(&payload.text()?)?;
+        let saved = payload.u64()? as usize;
+        let options = SimulationOptions {
+            threads: threads.or((saved > 0).then_some(saved)),
+            allow_intersections: payload.u64()? != 0,
+        };
+        let (time, step) = (payload.f64()?, payload.u64()?);
+        let (x, v) = (payload.points()?, payload.points()?);
+        if x.len() != v.len() {
+            return Err(invalid("as many velocities as positions", format!("{} and {}", v.len(), x.len())));
+        }
+        let pending = Pending { steps: payload.u64()?, dt: payload.f64()? };
+        let assets = payload.assets()?;
+        let report = payload.text()?;
+        if !payload.0.is_empty() {
+            return Err(invalid("the end of the payload", format!("{} more bytes", payload.0.len())));
+        }
+        let mut sim = Self::build(&scene, assets, options, Some(State { time, step, x, v }))?;
+        sim.pending = (pending.steps > 0).then_some(pending);
+        let threads = sim.report.threads;
+        sim.report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
+        sim.report.threads = threads;
+        Ok(sim)
+    }
+}
+
+fn invalid(expected: impl Into<String>, got: impl Into<String>) -> SimError {
+    SimError::InvalidCheckpoint { expected: expected.into(), got: got.into() }
+}
+
+/// The payload of a checkpoint whose header and checksum are right.
+fn open(bytes: &[u8]) -> Result<&[u8], SimError> {
+    if bytes.len() < HEADER || bytes[..MAGIC.len()] != MAGIC {
+        return Err(invalid("a file that starts with \"CLOTHSIM\"", "another file"));
+    }
+    let mut header = Reader(&bytes[MAGIC.len()..]);
+    let version = u32::from_le_bytes(header.array()?);
+    if version != VERSION {
+        return Err(invalid(format!("version {VERSION}"), format!("version {version}")));
+    }
+    let length = header.u64()?;
+    let rest = header.0;
+    if rest.len() as u64 != length.saturating_add(8) {
+        let expected = format!("{} bytes after the header", length.saturating_add(8));
+        return Err(invalid(expected, format!("{} (the file is cut off or has a tail)", rest.len())));
+    }
+    let (payload, mut sum) = (&rest[..length as usize], Reader(&rest[length as usize..]));
+    let expected = sum.u64()?;
+    let got = checksum(payload);
+    if got != expected {
+        return Err(invalid(format!("the checksum {expected:016x}"), format!("{got:016x} (damaged)")));
+    }
+    Ok(payload)
+}
+
+/// FNV-1a over 64-bit words, the last one filled up with zeros.
+fn checksum(bytes: &[u8]) -> u64 {
+    const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0100_0000_01b3;
+    let fold = |hash: u64, word: u64| (hash ^ word).wrapping_mul(PRIME);
+    let (words, tail) = bytes.as_chunks::<8>();
+    let hash = words.iter().fold(OFFSET, |hash, word| fold(hash, u64::from_le_bytes(*word)));
+    let mut last = [0; 8];
+    last[..tail.len()].copy_from_slice(tail);
+    fold(fold(hash, u64::from_le_bytes(last)), bytes.len() as u64)
+}
+
+#[derive(Default)]
+struct Writer(Vec<u8>);
+
+impl Writer {
+    fn u64(&mut self, value: u64) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn f64(&mut self, value: f64) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn text(&mut self, text: &str) {
+        self.u64(text.len() as u64);
+        self.0.extend(text.as_bytes());
+    }
+
+    fn points(&mut self, points: &[Vec3]) {
+        self.u64(points.len() as u64);
+        for p in points {
+            for c in p.iter() {
+                self.f64(*c);
+            }
+        }
+    }
+
+    fn triangles(&mut self, triangles: &[[u32; 3]]) {
+        self.u64(triangles.len() as u64);
+        for v in triangles.iter().flatten() {
+            self.0.extend(v.to_le_bytes());
+        }
+    }
+
+    fn assets(&mut self, assets: &Assets) {
+        self.u64(assets.meshes.len() as u64);
+        for (name, mesh) in &assets.meshes {
+            self.text(name);
+            self.points(&mesh.vertices);
+            self.triangles(&mesh.triangles);
+            self.u64(mesh.uv.as_ref().map_or(0, |uv| 1 + uv.len() as u64));
+            for c in mesh.uv.iter().flatten().flatten().flatten() {
+                self.f64(*c);
+            }
+        }
+        self.u64(assets.sequences.len() as u64);
+        for (name, sequence) in &assets.sequences {
+            self.text(name);
+            self.triangles(&sequence.triangles);
+            self.u64(sequence.frames.len() as u64);
+            for frame in &sequence.frames {
+                self.points(frame);
+            }
+        }
+        self.u64(assets.velocities.len() as u64);
+        for (name, velocities) in &assets.velocities {
+            self.text(name);
+            self.points(velocities);
+        }
+    }
+}
+
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], SimError> {
+        let (head, rest) = self.0.split_first_chunk().ok_or_else(|| invalid("more bytes", "the end"))?;
+        self.0 = rest;
+        Ok(*head)
+    }
+
+    fn u64(&mut self) -> Result<u64, SimError> {
+        Ok(u64::from_le_bytes(self.array()?))
+    }
+
+    fn f64(&mut self) -> Result<f64, SimError> {
+        Ok(f64::from_le_bytes(self.array()?))
+    }
+
+    /// A count of elements of `size` bytes, which must still be there.
+    fn count(&mut self, size: usize) -> Result<usize, SimError> {
+        let count = self.u64()?;
+        if count > (self.0.len() / size) as u64 {
+            return Err(invalid(
+                format!("{count} elements of {size} bytes"),
+                format!("{} bytes", self.0.len()),
+            ));
+        }
+        Ok(count as usize)
+    }
+
+    fn text(&mut self) -> Result<String, SimError> {
+        let count = self.count(1)?;
+        let (head, rest) = self.0.split_at(count);
+        self.0 = rest;
+        String::from_utf8(head.to_vec()).map_err(|e| invalid("text in UTF-8", e.to_string()))
+    }
+
+    fn points(&mut self) -> Result<Vec<Vec3>, SimError> {
+        let count = self.count(24)?;
+        (0..count).map(|_| Ok(Vec3::new(self.f64()?, self.f64()?, self.f64()?))).collect()
+    }
+
+    fn triangles(&mut self) -> Result<Vec<[u32; 3]>, SimError> {
+        let count = self.count(12)?;
+        let mut index = || Ok::<u32, SimError>(u32::from_le_bytes(self.array()?));
+        (0..count).map(|_| Ok([index()?, index()?, index()?])).collect()
+    }
+
+    fn map<T>(
+        &mut self,
+        read: impl Fn(&mut Self) -> Result<T, SimError>,
+    ) -> Result<BTreeMap<String, T>, SimError> {
+        let count = self.count(1)?;
+        (0..count).map(|_| Ok((self.text()?, read(self)?))).collect()
+    }
+
+    fn assets(&mut self) -> Result<Assets, SimError> {
+        let meshes = self.map(|r| {
+            let (vertices, triangles) = (r.points()?, r.triangles()?);
+            let uv = match r.count(1)? {
+                0 => None,
+                n => {
+                    let mut pair = || Ok::<_, SimError>([r.f64()?, r.f64()?]);
+                    Some((1..n).map(|_| Ok([pair()?, pair()?, pair()?])).collect::<Result<_, SimError>>()?)
+                }
+            };
+            Ok(TriMesh { vertices, triangles, uv })
+        })?;
+        let sequences = self.map(|r| {
+            let triangles = r.triangles()?;
+            let count = r.count(8)?;
+            let frames = (0..count).map(|_| r.points()).collect::<Result<_, _>>()?;
+            Ok(Sequence { triangles, frames })
+        })?;
+        let velocities = self.map(Reader::points)?;
+        Ok(Assets { meshes, sequences, velocities })
+    }
+}

@@ -1,0 +1,99 @@
+//! Why a simulation is not built, not resumed or stops.
+
+use crate::SceneError;
+
+/// How many elements an error's text lists.
+const SHOWN: usize = 8;
+
+/// An error of the engine. After one that stops a run ([`SimError::Diverged`], [`SimError::Stuck`]) the simulation
+/// holds the last good state.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// The scene has a wrong value, or an asset does not fit it.
+    #[error(transparent)]
+    InvalidScene(#[from] SceneError),
+    /// The start state has intersections and the scene does not allow them.
+    #[error(
+        "start state: expected no intersections, got {count} pairs of triangles that pass through each other; the first: {}; \
+         contact.allow_intersections runs all the same",
+        list(names)
+    )]
+    StartIntersections {
+        /// How many pairs of triangles.
+        count: usize,
+        /// The first pairs, as triangles of the global list (at most 64).
+        pairs: Vec<[u32; 2]>,
+        /// The first pairs in words: body and triangle of each.
+        names: Vec<String>,
+    },
+    /// The state became non-finite or ran away, at every step size tried.
+    #[error("diverged at t = {time} s: {reason}; vertices {}", list(vertices))]
+    Diverged {
+        /// Time of the last good state [s].
+        time: f64,
+        /// What was seen.
+        reason: String,
+        /// The vertices concerned (global indices).
+        vertices: Vec<u32>,
+    },
+    /// Collisions remain that no allowed motion avoids, at every step size tried.
+    #[error("stuck at t = {time} s: {} pairs still collide after every stage; vertices {}", pairs.len(), list(vertices))]
+    Stuck {
+        /// Time of the last good state [s].
+        time: f64,
+        /// The four vertices of each pair (global indices).
+        pairs: Vec<[u32; 4]>,
+        /// The vertices concerned (global indices).
+        vertices: Vec<u32>,
+    },
+    /// Bytes are no checkpoint of this version, or are damaged.
+    #[error("checkpoint: expected {expected}, got {got}")]
+    InvalidCheckpoint {
+        /// What was expected.
+        expected: String,
+        /// What came.
+        got: String,
+    },
+    /// An argument is out of range.
+    #[error("{name}: expected {expected}, got {got}")]
+    InvalidArgument {
+        /// Name of the argument.
+        name: &'static str,
+        /// What was expected, with the unit.
+        expected: &'static str,
+        /// What came.
+        got: String,
+    },
+    /// A stage refused what it was given for a reason that is not the scene's.
+    #[error("{stage}: {message}")]
+    Stage {
+        /// The stage.
+        stage: &'static str,
+        /// Its message.
+        message: String,
+    },
+}
+
+fn list<T: std::fmt::Display>(items: &[T]) -> String {
+    let mut text = items.iter().take(SHOWN).map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    if items.len() > SHOWN {
+        text += &format!(", … ({} in all)", items.len());
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_lists_are_cut() {
+        let error =
+            SimError::Diverged { time: 0.5, reason: "not finite".into(), vertices: (0..100).collect() };
+        let text = error.to_string();
+        assert!(
+            text.contains("t = 0.5 s") && text.contains("0, 1, 2, 3, 4, 5, 6, 7, … (100 in all)"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,270 @@
+//! Which effects a scene runs, which it does not, and why: known before the first step.
+
+use crate::bodies::Bodies;
+use crate::pins::PinSet;
+use crate::step::{ContactStage, State};
+use crate::{Scene, SceneError};
+use cloth_core::{CoreError, Integrator};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// One effect of the plan.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Effect {
+    /// Name.
+    pub name: String,
+    /// Whether it is built and runs.
+    pub on: bool,
+    /// Why, in words.
+    pub why: String,
+    /// Number of elements (0 if off).
+    pub elements: usize,
+    /// Memory of its data [B] (0 if off).
+    pub bytes: usize,
+}
+
+/// The effects of a scene, those that run first.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Name of the scene.
+    pub scene: String,
+    /// Effects in the order of the step, then those that are off.
+    pub effects: Vec<Effect>,
+    /// Cloth vertices, without colliders.
+    pub cloth_vertices: usize,
+    /// Triangles of all bodies.
+    pub triangles: usize,
+    /// Largest time step [s].
+    pub dt: f64,
+    /// Estimate of the largest stable step at the start [s], for explicit integrators.
+    pub stable_dt: Option<f64>,
+    /// What is likely to go wrong.
+    pub warnings: Vec<String>,
+}
+
+impl Plan {
+    /// Names of the effects that run.
+    pub fn running(&self) -> impl Iterator<Item = &str> {
+        self.effects.iter().filter(|e| e.on).map(|e| e.name.as_str())
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{}: {} cloth vertices, {} triangles, dt = {} s",
+            self.scene, self.cloth_vertices, self.triangles, self.dt
+        )?;
+        if let Some(stable) = self.stable_dt {
+            writeln!(f, "largest stable step at the start: about {stable:.3e} s")?;
+        }
+        let width = self.effects.iter().map(|e| e.name.chars().count()).max().unwrap_or(0);
+        for effect in self.effects.iter().filter(|e| e.on) {
+            let size = format!("{:>9}  {:>9}", effect.elements, bytes(effect.bytes));
+            writeln!(f, "  on   {:width$}  {size}  {}", effect.name, effect.why)?;
+        }
+        for effect in self.effects.iter().filter(|e| !e.on) {
+            writeln!(f, "  off  {:width$}  {:20}  {}", effect.name, "", effect.why)?;
+        }
+        for warning in &self.warnings {
+            writeln!(f, "warning: {warning}")?;
+        }
+        Ok(())
+    }
+}
+
+fn bytes(count: usize) -> String {
+    match count {
+        0..=9_999 => format!("{count} B"),
+        10_000..=9_999_999 => format!("{:.1} kB", count as f64 * 1e-3),
+        _ => format!("{:.1} MB", count as f64 * 1e-6),
+    }
+}
+
+/// Effects of the dynamics that a scene may call for, what calls for them, and what is the case where nothing does.
+const DYNAMICS: [(&str, &str, &str); 7] = [
+    ("gravity", "gravity is not zero", "gravity is zero"),
+    ("wind", "air.drag or air.lift is above zero", "air.density, or air.drag and air.lift, are zero"),
+    ("air-damping", "air.damping is above zero", "air.damping is zero"),
+    ("spring", "in_plane.model = \"spring\"", "no material has in_plane.model = \"spring\""),
+    (
+        "baraff-witkin",
+        "in_plane.model = \"baraff-witkin\"",
+        "no material has in_plane.model = \"baraff-witkin\"",
+    ),
+    (
+        "bending-spring",
+        "bending.model = \"bending-spring\"",
+        "no material has bending.model = \"bending-spring\" with a stiffness or damping",
+    ),
+    ("hinge", "bending.model = \"hinge\"", "no material has bending.model = \"hinge\" with a rigidity"),
+];
+
+/// Collects effects that are on and effects that are off.
+#[derive(Default)]
+struct Effects {
+    on: Vec<Effect>,
+    off: Vec<Effect>,
+}
+
+impl Effects {
+    fn on(&mut self, name: &str, why: impl Into<String>, elements: usize, bytes: usize) {
+        match self.on.iter_mut().find(|e| e.name == name) {
+            Some(known) => {
+                known.elements += elements;
+                known.bytes += bytes;
+            }
+            None => {
+                self.on.push(Effect { name: name.into(), on: true, why: why.into(), elements, bytes });
+            }
+        }
+    }
+
+    fn off(&mut self, name: &str, why: impl Into<String>) {
+        self.off.push(Effect { name: name.into(), on: false, why: why.into(), elements: 0, bytes: 0 });
+    }
+}
+
+/// The plan of what has been built.
+pub(crate) fn build(
+    scene: &Scene,
+    bodies: &Bodies,
+    integrator: &Integrator,
+    contact: Option<&ContactStage>,
+    pins: &PinSet,
+    state: &State,
+) -> Plan {
+    let mut effects = Effects::default();
+    let moving: Vec<_> = bodies.colliders.iter().filter(|c| c.motion.moves()).collect();
+    if moving.is_empty() {
+        effects.off("moving colliders", "no collider has keyframes or a sequence");
+    } else {
+        let vertices = moving.iter().map(|c| c.motion.vertex_count()).sum();
+        let bytes = moving.iter().map(|c| c.motion.bytes()).sum();
+        effects.on("moving colliders", "colliders with keyframes or a sequence", vertices, bytes);
+    }
+    if pins.vertices.is_empty() {
+        effects.off("pins", "no cloth has pins");
+    } else {
+        effects.on("pins", "cloth with pins", pins.vertices.len(), pins.bytes());
+    }
+
+    let built = integrator.system().effects();
+    for effect in &built {
+        let why = DYNAMICS.iter().find(|(name, ..)| *name == effect.name).map_or("called for", |d| d.1);
+        effects.on(effect.name, why, effect.elements, effect.bytes);
+    }
+    for (name, _, why) in DYNAMICS {
+        if !built.iter().any(|e| e.name == name) {
+            effects.off(name, why);
+        }
+    }
+    let method = scene.time.integrator;
+    effects.on(
+        "integrator",
+        format!("time.integrator = \"{}\"", kebab(&method)),
+        bodies.cloth_vertices,
+        4 * size_of_val(&state.x[..bodies.cloth_vertices]),
+    );
+    let explicit = method.is_explicit();
+    if explicit {
+        effects.off("linear solver", "the integrator is explicit");
+    } else {
+        effects.on(
+            "linear solver",
+            format!("solver.method = \"{}\"", kebab(&scene.solver.method)),
+            bodies.cloth_vertices,
+            0,
+        );
+    }
+    plan_contact(&mut effects, scene, bodies, contact);
+    effects.on("guard", "always", bodies.cloth_vertices, 0);
+
+    let mut warnings = Vec::new();
+    let stable_dt = explicit.then(|| integrator.stable_step(&state.x, &state.v));
+    if let Some(stable) = stable_dt.filter(|stable| scene.time.dt > *stable) {
+        warnings.push(format!(
+            "time.dt = {} s is above the largest stable step of \"{}\", about {stable:.3e} s: the run is likely to diverge",
+            scene.time.dt,
+            kebab(&method)
+        ));
+    }
+    if contact.is_none() && !scene.collider.is_empty() {
+        warnings.push("there are colliders but no [contact]: cloth passes through them".into());
+    }
+    let triangles = bodies.cloth.iter().map(|c| c.mesh.triangles.len()).sum::<usize>()
+        + bodies.colliders.iter().map(|c| c.triangles.len()).sum::<usize>();
+    effects.on.append(&mut effects.off);
+    Plan {
+        scene: scene.name.clone(),
+        effects: effects.on,
+        cloth_vertices: bodies.cloth_vertices,
+        triangles,
+        dt: scene.time.dt,
+        stable_dt: stable_dt.filter(|s| s.is_finite()),
+        warnings,
+    }
+}
+
+fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Option<&ContactStage>) {
+    let (Some(stage), Some(contact)) = (stage, &scene.contact) else {
+        for name in ["contact", "self-contact", "collider contact", "friction", "intersection count"] {
+            effects.off(name, "the scene has no [contact]");
+        }
+        return;
+    };
+    let mesh = &stage.mesh;
+    effects.on(
+        "contact",
+        format!("[contact] with detector \"{}\"", contact.detector),
+        mesh.triangles.len(),
+        stage.bytes(),
+    );
+    let selves = bodies.cloth.iter().zip(&mesh.bodies).filter(|(_, rule)| rule.self_collision);
+    let self_triangles: usize = selves.map(|(c, _)| c.mesh.triangles.len()).sum();
+    if self_triangles > 0 {
+        effects.on("self-contact", "contact.self and cloth.self_collision", self_triangles, 0);
+    } else {
+        effects.off("self-contact", "contact.self is false, or each cloth's self_collision is");
+    }
+    let others: usize = bodies.colliders.iter().map(|c| c.triangles.len()).sum();
+    if others > 0 {
+        effects.on("collider contact", "the scene has colliders", others, 0);
+    } else {
+        effects.off("collider contact", "the scene has no collider");
+    }
+    let on_cloth = contact.self_friction > 0.0 && (self_triangles > 0 || bodies.cloth.len() > 1);
+    let on_colliders = scene.collider.iter().any(|c| c.friction.unwrap_or(contact.friction) > 0.0);
+    if on_cloth || on_colliders {
+        effects.on("friction", "a coefficient of friction above zero", mesh.bodies.len(), 0);
+    } else {
+        effects.off("friction", "every coefficient of friction is zero");
+    }
+    if stage.allow {
+        effects.on("intersection count", "intersections are allowed", mesh.triangles.len(), 0);
+    } else {
+        effects.off("intersection count", "intersections are not allowed, so there are none");
+    }
+}
+
+/// The name of a choice as a scene file writes it.
+fn kebab<T: Serialize>(value: &T) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(name)) => name,
+        _ => String::new(),
+    }
+}
+
+/// An error of the dynamics in terms of the scene.
+pub(crate) fn core_error(scene: &Scene, error: &CoreError) -> SceneError {
+    match error {
+        CoreError::Parameter { name, expected, got } => scene.error(name, *expected, format!("{got}")),
+        CoreError::Degenerate { model, element, vertices, measure, got } => scene.error(
+            "cloth",
+            format!("elements with an extent for \"{model}\""),
+            format!("{measure} {got:e} at element {element} (vertices {vertices:?})"),
+        ),
+        other => scene.error("cloth", "cloth that can be built", other.to_string()),
+    }
+}

@@ -1,0 +1,162 @@
+//! What happened: per step, in total, and per effect.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything a run reports.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Report {
+    /// One entry per step (of `advance`'s size; sub-steps of a retried step are summed in it).
+    pub steps: Vec<StepReport>,
+    /// Sums and extremes over all steps.
+    pub totals: Totals,
+    /// What each effect costs.
+    pub effects: Vec<EffectCost>,
+    /// Threads of the pool.
+    pub threads: usize,
+}
+
+/// One step.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct StepReport {
+    /// Number of the step, from 1.
+    pub step: u64,
+    /// Time at its end [s].
+    pub time: f64,
+    /// Its size [s].
+    pub dt: f64,
+    /// Sub-steps taken: 1 unless it was retried smaller.
+    pub substeps: u32,
+    /// Attempts given up on the way.
+    pub retries: u32,
+    /// Newton iterations.
+    pub newton_iterations: usize,
+    /// Iterations of the linear solver.
+    pub linear_iterations: usize,
+    /// Largest relative residual reached.
+    pub residual: f64,
+    /// Whether every tolerance was met before its cap.
+    pub converged: bool,
+    /// Contact, if the scene has it.
+    pub contact: Option<ContactReport>,
+    /// Pairs of triangles that pass through each other at the end, counted where the scene allows them.
+    pub intersections: Option<usize>,
+    /// Seconds per stage, in the order in which the stages run.
+    pub seconds: Vec<(String, f64)>,
+}
+
+/// Contact in one step.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ContactReport {
+    /// Pairs within the thickness at the start.
+    pub proximities: usize,
+    /// Continuous detections over the step.
+    pub passes: usize,
+    /// Pairs that collided in the first of them.
+    pub collisions: usize,
+    /// Contacts that carry an impulse.
+    pub impulses: usize,
+    /// Sweeps over the contacts.
+    pub sweeps: usize,
+    /// Largest error of a contact's relative velocity [m/s].
+    pub residual: f64,
+    /// Rigid impact zones.
+    pub zones: usize,
+    /// Vertices in them.
+    pub zone_vertices: usize,
+    /// Vertices whose motion was held back.
+    pub held_vertices: usize,
+    /// Pairs exempt because they touch already at the start.
+    pub exempt: usize,
+}
+
+impl ContactReport {
+    pub(crate) fn add(&mut self, info: &cloth_response::ResponseInfo) {
+        self.proximities += info.proximities;
+        self.passes += info.passes;
+        self.collisions += info.collisions;
+        self.impulses += info.impulses;
+        self.sweeps += info.sweeps;
+        self.residual = self.residual.max(info.residual);
+        self.zones += info.zones;
+        self.zone_vertices += info.zone_vertices;
+        self.held_vertices += info.held_vertices;
+        self.exempt = self.exempt.max(info.exempt);
+    }
+}
+
+/// Sums and extremes over all steps.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Totals {
+    /// Steps.
+    pub steps: u64,
+    /// Sub-steps.
+    pub substeps: u64,
+    /// Attempts given up.
+    pub retries: u64,
+    /// Newton iterations.
+    pub newton_iterations: u64,
+    /// Iterations of the linear solver.
+    pub linear_iterations: u64,
+    /// Steps in which a tolerance was not met before its cap.
+    pub not_converged: u64,
+    /// Rigid impact zones.
+    pub zones: u64,
+    /// Vertices whose motion was held back.
+    pub held_vertices: u64,
+    /// Largest number of intersecting pairs at the end of a step, where they are allowed.
+    pub max_intersections: Option<usize>,
+    /// Wall-clock seconds in steps.
+    pub wall_seconds: f64,
+    /// Wall-clock seconds per stage, in the order in which the stages run.
+    pub seconds: Vec<(String, f64)>,
+}
+
+/// What an effect costs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectCost {
+    /// Name of the effect, as in the plan.
+    pub name: String,
+    /// Number of elements.
+    pub elements: usize,
+    /// Memory of its data [B].
+    pub bytes: usize,
+    /// Milliseconds in all steps so far; `None` where it is part of another stage.
+    pub milliseconds: Option<f64>,
+}
+
+impl Report {
+    /// Adds a step and its wall-clock seconds.
+    pub(crate) fn push(&mut self, step: StepReport, wall_seconds: f64) {
+        let t = &mut self.totals;
+        t.steps += 1;
+        t.substeps += u64::from(step.substeps);
+        t.retries += u64::from(step.retries);
+        t.newton_iterations += step.newton_iterations as u64;
+        t.linear_iterations += step.linear_iterations as u64;
+        t.not_converged += u64::from(!step.converged);
+        if let Some(contact) = &step.contact {
+            t.zones += contact.zones as u64;
+            t.held_vertices += contact.held_vertices as u64;
+        }
+        t.max_intersections = t.max_intersections.max(step.intersections);
+        t.wall_seconds += wall_seconds;
+        for (name, seconds) in &step.seconds {
+            add_seconds(&mut t.seconds, name, *seconds);
+        }
+        for effect in &mut self.effects {
+            let stages = step.seconds.iter().filter(|(name, _)| *name == effect.name);
+            for (_, seconds) in stages {
+                *effect.milliseconds.get_or_insert(0.0) += 1e3 * seconds;
+            }
+        }
+        self.steps.push(step);
+    }
+}
+
+/// Adds to the entry of that name; new names keep the place of their first mention.
+pub(crate) fn add_seconds(list: &mut Vec<(String, f64)>, name: &str, seconds: f64) {
+    match list.iter_mut().find(|(known, _)| known == name) {
+        Some((_, sum)) => *sum += seconds,
+        None => list.push((name.into(), seconds)),
+    }
+}

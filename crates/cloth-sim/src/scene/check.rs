@@ -1,0 +1,250 @@
+//! Value ranges and what belongs together, as far as the scene alone can tell.
+
+use super::{Cloth, Collider, Keyframe, MaterialChoice, Pin, Rotation, Scene, SceneError};
+use cloth_core::{CoreError, material::library};
+
+impl Scene {
+    /// Refuses values out of range, names that are not known or not unique, and keys that exclude each other.
+    ///
+    /// # Errors
+    /// The first defect, with file and line where the scene was read from a file.
+    pub fn check(&self) -> Result<(), SceneError> {
+        if let Some(g) = self.gravity {
+            self.finite("gravity", &g, "m/s²")?;
+        }
+        self.positive("duration", self.duration, "s")?;
+        self.positive("time.dt", self.time.dt, "s")?;
+        self.positive("time.newton_tolerance", self.time.newton_tolerance, "")?;
+        self.at_least_one("time.newton_max_iterations", self.time.newton_max_iterations)?;
+        /// 2¹⁶ sub-steps of one step; a step that still fails is stuck.
+        const MAX_HALVINGS: u32 = 16;
+        if self.time.max_halvings > MAX_HALVINGS {
+            return Err(self.error("time.max_halvings", "0 to 16", self.time.max_halvings.to_string()));
+        }
+        self.positive("solver.tolerance", self.solver.tolerance, "")?;
+        self.at_least_one("solver.max_iterations", self.solver.max_iterations)?;
+        self.finite("air.wind", &self.air.wind, "m/s")?;
+        self.not_negative("air.density", self.air.density, "kg/m³")?;
+        self.not_negative("air.drag", self.air.drag, "")?;
+        self.not_negative("air.lift", self.air.lift, "")?;
+        self.not_negative("air.damping", self.air.damping, "1/s")?;
+        self.positive("output.fps", self.output.fps, "1/s")?;
+        self.not_negative("output.checkpoint_interval", self.output.checkpoint_interval, "s")?;
+        self.check_contact()?;
+        self.check_names()?;
+        for (i, cloth) in self.cloth.iter().enumerate() {
+            self.check_cloth(cloth, &format!("cloth[{i}]"))?;
+        }
+        for (i, collider) in self.collider.iter().enumerate() {
+            self.check_collider(collider, &format!("collider[{i}]"))?;
+        }
+        Ok(())
+    }
+
+    fn check_contact(&self) -> Result<(), SceneError> {
+        let Some(contact) = &self.contact else { return Ok(()) };
+        self.positive("contact.thickness", contact.thickness, "m")?;
+        self.not_negative("contact.friction", contact.friction, "")?;
+        self.not_negative("contact.self_friction", contact.self_friction, "")?;
+        self.not_negative("contact.repulsion_stiffness", contact.repulsion_stiffness, "N/m")?;
+        self.at_least_one("contact.max_passes", contact.max_passes)?;
+        if !DETECTORS.contains(&contact.detector.as_str()) {
+            let got = format!("\"{}\"", contact.detector);
+            return Err(self
+                .error("contact.detector", format!("one of {DETECTORS:?}"), got)
+                .with_nearest(&contact.detector, DETECTORS.into_iter()));
+        }
+        Ok(())
+    }
+
+    fn check_names(&self) -> Result<(), SceneError> {
+        if self.cloth.is_empty() {
+            return Err(self.error("cloth", "at least one piece of cloth", "none"));
+        }
+        let names = (self.cloth.iter().enumerate().map(|(i, c)| (format!("cloth[{i}].name"), &c.name)))
+            .chain(self.collider.iter().enumerate().map(|(i, c)| (format!("collider[{i}].name"), &c.name)));
+        let mut seen: Vec<(String, &String)> = Vec::new();
+        for (key, name) in names {
+            if name.is_empty() {
+                return Err(self.error(&key, "a name", "an empty string"));
+            }
+            if let Some((first, _)) = seen.iter().find(|(_, other)| *other == name) {
+                return Err(self.error(
+                    &key,
+                    "a name that no other body has",
+                    format!("\"{name}\" ({first} too)"),
+                ));
+            }
+            seen.push((key, name));
+        }
+        Ok(())
+    }
+
+    fn check_cloth(&self, cloth: &Cloth, key: &str) -> Result<(), SceneError> {
+        self.resolve_material(cloth, key)?;
+        self.finite(&format!("{key}.warp"), &cloth.warp, "")?;
+        if cloth.warp == [0.0; 3] {
+            return Err(self.error(
+                &format!("{key}.warp"),
+                "a direction of any length but zero",
+                "[0, 0, 0]",
+            ));
+        }
+        self.finite(&format!("{key}.position"), &cloth.position, "m")?;
+        self.finite(&format!("{key}.velocity"), &cloth.velocity, "m/s")?;
+        self.check_rotation(cloth.rotation.as_ref(), &format!("{key}.rotation"))?;
+        for (i, pin) in cloth.pins.iter().enumerate() {
+            self.check_pin(pin, &format!("{key}.pins[{i}]"))?;
+        }
+        Ok(())
+    }
+
+    /// The parameters of a cloth's material, checked.
+    pub(crate) fn resolve_material(
+        &self,
+        cloth: &Cloth,
+        key: &str,
+    ) -> Result<cloth_core::Material, SceneError> {
+        match &cloth.material {
+            MaterialChoice::Named(name) => library::named(name).map_err(|_| {
+                let known = library::names();
+                self.error(&format!("{key}.material"), format!("one of {known:?}"), format!("\"{name}\""))
+                    .with_nearest(name, known.into_iter())
+            }),
+            MaterialChoice::Given(material) => match material.check() {
+                Ok(()) => Ok(*material),
+                Err(CoreError::Parameter { name, expected, got }) => {
+                    Err(self.error(&format!("{key}.material.{name}"), expected, format!("{got}")))
+                }
+                Err(other) => Err(self.error(&format!("{key}.material"), "a material", other.to_string())),
+            },
+        }
+    }
+
+    fn check_pin(&self, pin: &Pin, key: &str) -> Result<(), SceneError> {
+        match (&pin.vertices, &pin.region) {
+            (Some(_), Some(_)) => return Err(self.error(key, "either vertices or box", "both")),
+            (None, None) => return Err(self.error(key, "vertices or box", "neither")),
+            (None, Some(region)) => {
+                self.finite(&format!("{key}.box.min"), &region.min, "m")?;
+                self.finite(&format!("{key}.box.max"), &region.max, "m")?;
+                if (0..3).any(|a| region.min[a] > region.max[a]) {
+                    let got = format!("{:?} and {:?}", region.min, region.max);
+                    return Err(self.error(&format!("{key}.box"), "min ≤ max along each axis", got));
+                }
+            }
+            (Some(vertices), None) if vertices.is_empty() => {
+                return Err(self.error(&format!("{key}.vertices"), "at least one vertex", "none"));
+            }
+            _ => {}
+        }
+        if let Some(name) = &pin.collider {
+            if !pin.keyframes.is_empty() {
+                return Err(self.error(key, "either keyframes or collider", "both"));
+            }
+            if !self.collider.iter().any(|c| &c.name == name) {
+                let known: Vec<&str> = self.collider.iter().map(|c| c.name.as_str()).collect();
+                return Err(self
+                    .error(
+                        &format!("{key}.collider"),
+                        format!("the name of a collider, one of {known:?}"),
+                        format!("\"{name}\""),
+                    )
+                    .with_nearest(name, known.into_iter()));
+            }
+        }
+        if let Some(pivot) = &pin.pivot {
+            self.finite(&format!("{key}.pivot"), pivot, "m")?;
+        }
+        self.check_keyframes(&pin.keyframes, &format!("{key}.keyframes"))
+    }
+
+    fn check_collider(&self, collider: &Collider, key: &str) -> Result<(), SceneError> {
+        let given = [collider.shape.is_some(), collider.mesh.is_some(), collider.sequence.is_some()];
+        let count = given.iter().filter(|g| **g).count();
+        if count != 1 {
+            let got = if count == 0 { "none" } else { "more than one" };
+            return Err(self.error(key, "exactly one of shape, mesh, sequence", got));
+        }
+        if let Some(sequence) = &collider.sequence {
+            let key = format!("{key}.sequence");
+            if sequence.file.is_some() == sequence.asset.is_some() {
+                let got = if sequence.file.is_some() { "both" } else { "neither" };
+                return Err(self.error(&key, "exactly one of file, asset", got));
+            }
+            self.positive(&format!("{key}.fps"), sequence.fps, "1/s")?;
+            self.finite(&format!("{key}.start"), &[sequence.start], "s")?;
+            if !collider.keyframes.is_empty() {
+                return Err(self.error(&format!("{key}.keyframes"), "none beside a sequence", "some"));
+            }
+        }
+        self.finite(&format!("{key}.position"), &collider.position, "m")?;
+        self.check_rotation(collider.rotation.as_ref(), &format!("{key}.rotation"))?;
+        self.check_keyframes(&collider.keyframes, &format!("{key}.keyframes"))?;
+        if let Some(friction) = collider.friction {
+            self.not_negative(&format!("{key}.friction"), friction, "")?;
+        }
+        Ok(())
+    }
+
+    fn check_keyframes(&self, keyframes: &[Keyframe], key: &str) -> Result<(), SceneError> {
+        for (i, frame) in keyframes.iter().enumerate() {
+            let key = format!("{key}[{i}]");
+            self.finite(&format!("{key}.time"), &[frame.time], "s")?;
+            if i > 0 && frame.time <= keyframes[i - 1].time {
+                return Err(self.error(
+                    &format!("{key}.time"),
+                    format!("a time later than {} s", keyframes[i - 1].time),
+                    format!("{}", frame.time),
+                ));
+            }
+            if let Some(position) = &frame.position {
+                self.finite(&format!("{key}.position"), position, "m")?;
+            }
+            self.check_rotation(frame.rotation.as_ref(), &format!("{key}.rotation"))?;
+        }
+        Ok(())
+    }
+
+    fn check_rotation(&self, rotation: Option<&Rotation>, key: &str) -> Result<(), SceneError> {
+        let Some(rotation) = rotation else { return Ok(()) };
+        self.finite(&format!("{key}.angle"), &[rotation.angle], "rad")?;
+        self.finite(&format!("{key}.axis"), &rotation.axis, "")?;
+        if rotation.axis == [0.0; 3] {
+            return Err(self.error(&format!("{key}.axis"), "an axis of any length but zero", "[0, 0, 0]"));
+        }
+        Ok(())
+    }
+
+    fn finite(&self, key: &str, values: &[f64], unit: &str) -> Result<(), SceneError> {
+        match values.iter().find(|x| !x.is_finite()) {
+            Some(x) => Err(self.error(key, with_unit("finite numbers", unit), format!("{x}"))),
+            None => Ok(()),
+        }
+    }
+
+    fn positive(&self, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
+        if value.is_finite() && value > 0.0 {
+            return Ok(());
+        }
+        Err(self.error(key, with_unit("a finite number > 0", unit), format!("{value}")))
+    }
+
+    fn not_negative(&self, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
+        if value.is_finite() && value >= 0.0 {
+            return Ok(());
+        }
+        Err(self.error(key, with_unit("a finite number ≥ 0", unit), format!("{value}")))
+    }
+
+    fn at_least_one(&self, key: &str, value: usize) -> Result<(), SceneError> {
+        if value > 0 { Ok(()) } else { Err(self.error(key, "an integer ≥ 1", "0")) }
+    }
+}
+
+/// Names that [`cloth_collision::detector`] takes.
+const DETECTORS: [&str; 2] = ["bvh", "brute"];
+
+fn with_unit(expected: &str, unit: &str) -> String {
+    if unit.is_empty() { expected.into() } else { format!("{expected} [{unit}]") }
+}

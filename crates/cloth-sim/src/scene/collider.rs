@@ -1,0 +1,117 @@
+//! A body that moves as prescribed.
+
+use super::{Keyframe, MeshSource, Rotation};
+use cloth_collision::shapes::Shape;
+use serde::{Deserialize, Serialize};
+
+/// A body that moves as prescribed and that cloth meets. Exactly one of `shape`, `mesh` and `sequence`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Collider {
+    /// Name, unique among all bodies.
+    pub name: String,
+    /// A simple shape.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<ShapeSource>,
+    /// A rigid triangle mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<MeshSource>,
+    /// An animated mesh: vertices per frame, linear in between.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<SequenceSource>,
+    /// Position of its origin [m].
+    #[serde(default)]
+    pub position: [f64; 3],
+    /// Rotation about its origin, before the position is added.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotation: Option<Rotation>,
+    /// Poses over time; without them it stands still. Not with `sequence`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub keyframes: Vec<Keyframe>,
+    /// Coulomb coefficient of cloth on this collider [-], ≥ 0; by default `contact.friction`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<f64>,
+}
+
+/// A simple shape, centred at its origin, axis along +y, and how closely triangles follow it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum ShapeSource {
+    /// Sphere.
+    Sphere {
+        /// Radius [m].
+        radius: f64,
+        /// Largest distance between triangles and the true surface [m].
+        #[serde(default = "default_tolerance")]
+        tolerance: f64,
+    },
+    /// Capsule about the y-axis.
+    Capsule {
+        /// Radius [m].
+        radius: f64,
+        /// Half the length of the straight part [m].
+        half_height: f64,
+        /// Largest distance between triangles and the true surface [m].
+        #[serde(default = "default_tolerance")]
+        tolerance: f64,
+    },
+    /// Box.
+    Box {
+        /// Half the size along x, y, z [m].
+        half_extents: [f64; 3],
+    },
+    /// Square in the plane y = 0, normal +y.
+    Plane {
+        /// Half the side [m].
+        half_size: f64,
+    },
+    /// Cone, apex up.
+    Cone {
+        /// Radius of the base [m].
+        radius: f64,
+        /// Height [m].
+        height: f64,
+        /// Largest distance between triangles and the true surface [m].
+        #[serde(default = "default_tolerance")]
+        tolerance: f64,
+    },
+}
+
+/// Half a millimetre: less than the thickness of any cloth worth naming.
+const DEFAULT_TOLERANCE: f64 = 5e-4;
+
+fn default_tolerance() -> f64 {
+    DEFAULT_TOLERANCE
+}
+
+impl ShapeSource {
+    /// The shape and its tolerance [m].
+    pub fn parts(&self) -> (Shape, f64) {
+        match *self {
+            Self::Sphere { radius, tolerance } => (Shape::Sphere { radius }, tolerance),
+            Self::Capsule { radius, half_height, tolerance } => {
+                (Shape::Capsule { radius, half_height }, tolerance)
+            }
+            Self::Box { half_extents } => (Shape::Box { half_extents }, DEFAULT_TOLERANCE),
+            Self::Plane { half_size } => (Shape::Plane { half_size }, DEFAULT_TOLERANCE),
+            Self::Cone { radius, height, tolerance } => (Shape::Cone { radius, height }, tolerance),
+        }
+    }
+}
+
+/// An animated mesh. Exactly one of `file` and `asset`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SequenceSource {
+    /// Path of a file with the frames, relative to the scene file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Name of an asset with the frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub asset: Option<String>,
+    /// Frames per second, > 0.
+    pub fps: f64,
+    /// Time of the first frame [s]; before it and after the last the mesh stands still.
+    #[serde(default)]
+    pub start: f64,
+}

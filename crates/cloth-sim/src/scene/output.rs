@@ -1,0 +1,40 @@
+//! What a run writes.
+
+use serde::{Deserialize, Serialize};
+
+/// What a run writes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Output {
+    /// Frames per second of simulated time, > 0.
+    pub fps: f64,
+    /// All frames in one NumPy archive.
+    pub npz: bool,
+    /// One OBJ file per frame.
+    pub obj: bool,
+    /// One PLY file per frame.
+    pub ply: bool,
+    /// Time-sampled USD.
+    pub usd: bool,
+    /// A picture of several frames side by side.
+    pub film_strip: bool,
+    /// Energies and timings over time.
+    pub plots: bool,
+    /// Simulated time between checkpoints [s]; 0: none.
+    pub checkpoint_interval: f64,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self {
+            fps: 60.0,
+            npz: true,
+            obj: false,
+            ply: false,
+            usd: true,
+            film_strip: true,
+            plots: true,
+            checkpoint_interval: 0.5,
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! What holds for the whole scene: axes, time, air, contact.
+
+use cloth_core::{IntegratorParams, Method, Psd};
+use serde::{Deserialize, Serialize};
+
+/// Which axis points up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Up {
+    /// +y.
+    #[default]
+    Y,
+    /// +z.
+    Z,
+}
+
+/// Time step and integrator.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Time {
+    /// Largest time step [s], > 0. A run divides each frame into equal steps of at most this.
+    pub dt: f64,
+    /// Integration scheme.
+    pub integrator: Method,
+    /// What the implicit schemes do about indefinite element matrices.
+    pub indefinite: Psd,
+    /// Newton's method stops at this residual relative to its first (`implicit-newton`), > 0.
+    pub newton_tolerance: f64,
+    /// Newton's method stops after this many iterations (`implicit-newton`), ≥ 1.
+    pub newton_max_iterations: usize,
+    /// How often a step that fails is halved before the run stops.
+    pub max_halvings: u32,
+}
+
+impl Default for Time {
+    fn default() -> Self {
+        let core = IntegratorParams::default();
+        Self {
+            dt: 0.005,
+            integrator: core.method,
+            indefinite: core.psd,
+            newton_tolerance: core.newton_tolerance,
+            newton_max_iterations: core.newton_max_iterations,
+            max_halvings: 6,
+        }
+    }
+}
+
+/// Air.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Air {
+    /// Velocity of the wind [m/s].
+    pub wind: [f64; 3],
+    /// Density of the air [kg/m³], ≥ 0.
+    pub density: f64,
+    /// Drag coefficient of the cloth [-], ≥ 0.
+    pub drag: f64,
+    /// Lift coefficient of the cloth [-], ≥ 0.
+    pub lift: f64,
+    /// Damping proportional to mass, relative to the wind [1/s], ≥ 0.
+    pub damping: f64,
+}
+
+impl Default for Air {
+    fn default() -> Self {
+        Self { wind: [0.0; 3], density: 1.2, drag: 0.0, lift: 0.0, damping: 0.0 }
+    }
+}
+
+/// Contact of cloth with itself, other cloth and colliders.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Contact {
+    /// Distance at which surfaces rest on each other [m], > 0.
+    pub thickness: f64,
+    /// Detection method: "bvh", or "brute" (every pair, the oracle).
+    pub detector: String,
+    /// Whether cloth meets itself; a piece of cloth may opt out with its own `self_collision`.
+    #[serde(rename = "self")]
+    pub self_collision: bool,
+    /// Coulomb coefficient of cloth on colliders [-], ≥ 0; a collider may have its own.
+    pub friction: f64,
+    /// Coulomb coefficient of cloth on cloth [-], ≥ 0.
+    pub self_friction: f64,
+    /// Stiffness of the repulsion of one contact within the thickness [N/m], ≥ 0.
+    pub repulsion_stiffness: f64,
+    /// Detection passes answered with impulses, ≥ 1.
+    pub max_passes: usize,
+    /// Detection passes answered with rigid impact zones.
+    pub max_zone_passes: usize,
+    /// Runs from a start with intersections, makes none worse and reports their number.
+    pub allow_intersections: bool,
+}
+
+impl Default for Contact {
+    fn default() -> Self {
+        let response = cloth_response::ResponseParams::default();
+        Self {
+            thickness: response.thickness,
+            detector: "bvh".into(),
+            self_collision: true,
+            friction: response.friction.default,
+            self_friction: response.friction.self_friction,
+            repulsion_stiffness: response.repulsion_stiffness,
+            max_passes: response.max_passes,
+            max_zone_passes: response.max_zone_passes,
+            allow_intersections: response.allow_initial_contacts,
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! One step, stages in reading order.
+//!
+//! Prescribed targets at t + dt → dynamics → response → guard → commit. A step that fails at any stage leaves the state
+//! as it was and is retried with half the size, down to `time.max_halvings` halvings; then the run stops.
+
+use crate::bodies::Bodies;
+use crate::guard::Alarm;
+use crate::pins::PinSet;
+use crate::report::add_seconds;
+use crate::scene::Contact;
+use crate::{Scene, SimError, Simulation, StepReport, Vec3};
+use cloth_collision::{Body, Bvh, CollisionMesh, Detector, detector, intersections};
+use cloth_core::Pins;
+use cloth_response::{FrictionRule, Responder, ResponseError, ResponseParams};
+use std::time::Instant;
+
+/// The state that a checkpoint holds.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct State {
+    pub(crate) time: f64,
+    pub(crate) step: u64,
+    pub(crate) x: Vec<Vec3>,
+    pub(crate) v: Vec<Vec3>,
+}
+
+impl State {
+    /// Cloth as placed, colliders at t = 0.
+    pub(crate) fn start(bodies: &Bodies) -> Self {
+        let mut x = Vec::with_capacity(bodies.vertices);
+        let mut v = Vec::with_capacity(bodies.vertices);
+        for body in &bodies.cloth {
+            x.extend_from_slice(&body.x);
+            v.extend_from_slice(&body.v);
+        }
+        x.resize(bodies.vertices, Vec3::zeros());
+        v.resize(bodies.vertices, Vec3::zeros());
+        for body in &bodies.colliders {
+            let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
+            body.motion.write(0.0, &mut x[range]);
+        }
+        Self { time: 0.0, step: 0, x, v }
+    }
+
+    /// Moves pinned vertices to where their motion starts, at rest.
+    pub(crate) fn place_pins(&mut self, bodies: &Bodies, pins: &PinSet) {
+        let mut targets = vec![Vec3::zeros(); pins.vertices.len()];
+        pins.write(bodies, 0.0, &self.x, &mut targets);
+        for (&v, target) in pins.vertices.iter().zip(targets) {
+            self.x[v as usize] = target;
+            self.v[v as usize] = Vec3::zeros();
+        }
+    }
+}
+
+/// What a scene with contact has and one without does not.
+pub(crate) struct ContactStage {
+    pub(crate) mesh: CollisionMesh,
+    bvh: Bvh,
+    /// Another method than the hierarchy for continuous detection.
+    continuous: Option<Box<dyn Detector>>,
+    responder: Responder,
+    /// Whether known intersections are allowed.
+    pub(crate) allow: bool,
+}
+
+impl ContactStage {
+    pub(crate) fn new(
+        scene: &Scene,
+        contact: &Contact,
+        allow: bool,
+        bodies: &Bodies,
+        pins: &PinSet,
+        x: &[Vec3],
+    ) -> Result<Self, SimError> {
+        let allow = allow || contact.allow_intersections;
+        let cloth = bodies.cloth.iter().zip(&scene.cloth).map(|(body, source)| {
+            let self_collision = contact.self_collision && source.self_collision;
+            (Body { dynamic: true, self_collision }, body.x.len(), &body.mesh.triangles[..])
+        });
+        let colliders = bodies.colliders.iter().map(|body| {
+            let rule = Body { dynamic: false, self_collision: false };
+            (rule, body.motion.vertex_count(), &body.triangles[..])
+        });
+        let list: Vec<_> = cloth.chain(colliders).collect();
+        let mut mesh = CollisionMesh::new(&list).map_err(|e| stage("collision mesh", &e))?;
+        for &(vertex, collider) in &pins.attachments {
+            mesh.set_attachment(vertex, (bodies.cloth.len() + collider) as u32);
+        }
+        let bvh = Bvh::new(&mesh, x).map_err(|e| stage("collision mesh", &e))?;
+        let continuous = if contact.detector == bvh.name() {
+            None
+        } else {
+            Some(detector(&contact.detector, &mesh, x).map_err(|e| stage("detector", &e))?)
+        };
+        let own = scene.collider.iter().map(|c| c.friction.unwrap_or(contact.friction));
+        let params = ResponseParams {
+            thickness: contact.thickness,
+            repulsion_stiffness: contact.repulsion_stiffness,
+            friction: FrictionRule {
+                self_friction: contact.self_friction,
+                bodies: vec![contact.self_friction; bodies.cloth.len()].into_iter().chain(own).collect(),
+                default: contact.friction,
+            },
+            max_passes: contact.max_passes,
+            max_zone_passes: contact.max_zone_passes,
+            allow_initial_contacts: allow,
+            ..ResponseParams::default()
+        };
+        let mut responder = Responder::new(&mesh, params).map_err(|e| stage("contact", &e))?;
+        let mut rest_x = x.to_vec();
+        for body in &bodies.cloth {
+            rest_x[body.first_vertex..body.first_vertex + body.x.len()].copy_from_slice(&body.mesh.vertices);
+        }
+        responder.set_rest(&mesh, &rest_x).map_err(|e| stage("contact", &e))?;
+        Ok(Self { mesh, bvh, continuous, responder, allow })
+    }
+
+    pub(crate) fn intersections(
+        &self,
+        x: &[Vec3],
+        pool: &rayon::ThreadPool,
+    ) -> Result<Vec<[u32; 2]>, SimError> {
+        intersections(&self.mesh, x, pool).map_err(|e| stage("intersections", &e))
+    }
+
+    /// Memory of the collision topology [B].
+    pub(crate) fn bytes(&self) -> usize {
+        let mesh = &self.mesh;
+        size_of_val(&mesh.triangles[..])
+            + size_of_val(&mesh.edges[..])
+            + size_of_val(&mesh.triangle_edges[..])
+            + size_of_val(&mesh.vertex_body[..])
+            + size_of_val(&mesh.attached_to[..])
+            + size_of_val(&mesh.vertex_owner[..])
+            + size_of_val(&mesh.edge_owner[..])
+    }
+}
+
+fn stage(stage: &'static str, error: &dyn std::error::Error) -> SimError {
+    SimError::Stage { stage, message: error.to_string() }
+}
+
+/// Why an attempt at a step was given up; the state is as before it.
+enum Failure {
+    Alarm(Alarm),
+    Unresolved {
+        pairs: Vec<[u32; 4]>,
+        vertices: Vec<u32>,
+    },
+    /// Not a matter of the step's size.
+    Stop(SimError),
+}
+
+impl Simulation {
+    /// One step of `dt` [s], in sub-steps if need be.
+    pub(crate) fn step_by(&mut self, dt: f64) -> Result<(), SimError> {
+        let started = Instant::now();
+        let t0 = self.state.time;
+        let halvings = self.scene.time.max_halvings;
+        // Time within the step in units of dt/2^halvings, so that sub-steps end exactly at t0 + dt.
+        let whole = 1_u64 << halvings;
+        let at = |units: u64| if units == whole { t0 + dt } else { t0 + dt * (units as f64 / whole as f64) };
+        let mut report = StepReport { dt, converged: true, ..StepReport::default() };
+        let (mut done, mut size) = (0, whole);
+        while done < whole {
+            match self.attempt(at(done), at(done + size), &mut report) {
+                Ok(()) => {
+                    done += size;
+                    report.substeps += 1;
+                }
+                Err(Failure::Stop(error)) => return Err(error),
+                Err(_) if size > 1 => {
+                    size /= 2;
+                    report.retries += 1;
+                }
+                Err(Failure::Alarm(Alarm { reason, vertices })) => {
+                    return Err(SimError::Diverged { time: self.state.time, reason, vertices });
+                }
+                Err(Failure::Unresolved { pairs, vertices }) => {
+                    return Err(SimError::Stuck { time: self.state.time, pairs, vertices });
+                }
+            }
+        }
+        self.state.step += 1;
+        report.step = self.state.step;
+        report.time = self.state.time;
+        if self.contact.as_ref().is_some_and(|c| c.allow) {
+            report.intersections = Some(self.intersections()?.len());
+        }
+        self.report.push(report, started.elapsed().as_secs_f64());
+        Ok(())
+    }
+
+    /// The motion from `t0` to `t1`: accepted and written, or given up without a trace.
+    fn attempt(&mut self, t0: f64, t1: f64, report: &mut StepReport) -> Result<(), Failure> {
+        let dt = t1 - t0;
+        let (mut x, mut v) = (self.state.x.clone(), self.state.v.clone());
+
+        let clock = Instant::now();
+        let (pin_x, pin_v) = self.prescribe(t1, dt, &mut x, &mut v);
+        add_seconds(&mut report.seconds, "prescribed", clock.elapsed().as_secs_f64());
+
+        let pins = Pins { vertices: &self.pins.vertices, x_t1: &pin_x, v_t1: &pin_v };
+        let info = self.integrator.step(&mut x, &mut v, t0, dt, &pins).map_err(|error| match error {
+            cloth_core::StepError::Solver(error) => {
+                Failure::Alarm(Alarm { reason: error.to_string(), vertices: Vec::new() })
+            }
+            other => Failure::Stop(stage("dynamics", &other)),
+        })?;
+        for (name, seconds) in &info.seconds {
+            add_seconds(&mut report.seconds, name, *seconds);
+        }
+        self.check(&x, &v, report)?;
+
+        if let Some(contact) = &mut self.contact {
+            let ContactStage { mesh, bvh, continuous, responder, .. } = contact;
+            let (x_t0, masses, pool) = (&self.state.x, &self.inv_mass, &self.pool);
+            let result = match continuous {
+                None => responder.respond(mesh, bvh, masses, x_t0, &mut x, &mut v, dt, pool),
+                Some(other) => {
+                    responder.respond_with(mesh, bvh, other.as_mut(), masses, x_t0, &mut x, &mut v, dt, pool)
+                }
+            };
+            let info = result.map_err(|error| match error {
+                ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
+                ResponseError::NotFinite { name, vertex } => Failure::Alarm(Alarm {
+                    reason: format!("{name} not finite"),
+                    vertices: vec![vertex as u32],
+                }),
+                other => Failure::Stop(stage("contact", &other)),
+            })?;
+            report.contact.get_or_insert_default().add(&info);
+            for (name, seconds) in &info.seconds {
+                add_seconds(&mut report.seconds, name, *seconds);
+            }
+            self.check(&x, &v, report)?;
+        }
+
+        report.newton_iterations += info.newton_iterations;
+        report.linear_iterations += info.linear_iterations;
+        report.residual = report.residual.max(info.residual);
+        report.converged &= info.converged;
+        self.state.x = x;
+        self.state.v = v;
+        self.state.time = t1;
+        Ok(())
+    }
+
+    /// Writes where colliders and pins are at `t1`, and the mean velocity of their way there.
+    fn prescribe(&self, t1: f64, dt: f64, x: &mut [Vec3], v: &mut [Vec3]) -> (Vec<Vec3>, Vec<Vec3>) {
+        let x_t0 = &self.state.x;
+        for body in &self.bodies.colliders {
+            if !body.motion.moves() {
+                continue;
+            }
+            let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
+            body.motion.write(t1, &mut x[range.clone()]);
+            for i in range {
+                v[i] = (x[i] - x_t0[i]) / dt;
+            }
+        }
+        let mut pin_x = vec![Vec3::zeros(); self.pins.vertices.len()];
+        self.pins.write(&self.bodies, t1, x, &mut pin_x);
+        let pin_v =
+            self.pins.vertices.iter().zip(&pin_x).map(|(&i, p)| (p - x_t0[i as usize]) / dt).collect();
+        (pin_x, pin_v)
+    }
+
+    fn check(&self, x: &[Vec3], v: &[Vec3], report: &mut StepReport) -> Result<(), Failure> {
+        let clock = Instant::now();
+        let result = self.guard.check(&self.state.x, x, v).map_err(Failure::Alarm);
+        add_seconds(&mut report.seconds, "guard", clock.elapsed().as_secs_f64());
+        result
+    }
+}
