@@ -37,6 +37,9 @@ pub enum CoreError {
         /// Its value.
         got: f64,
     },
+    /// The mesh does not allow the law.
+    #[error(transparent)]
+    Mesh(#[from] crate::mesh::MeshError),
     /// Arrays that belong together have different lengths.
     #[error("{name}: expected length {expected}, got {got}")]
     Length {

@@ -9,9 +9,9 @@
 
 pub use cloth_mesh as mesh;
 
-pub mod forces;
+mod forces;
 pub mod material;
-pub mod solver;
+mod solver;
 
 mod assembly;
 mod energy;
@@ -20,7 +20,6 @@ mod error;
 mod integrator;
 mod system;
 
-pub use assembly::{BlockMatrix, Weights};
 pub use energy::Energy;
 pub use environment::Environment;
 pub use error::{CoreError, StepError};

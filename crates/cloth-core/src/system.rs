@@ -1,7 +1,17 @@
 //! All force models of all cloth of a scene.
 
+use rayon::prelude::*;
+
 use crate::{
-    CoreError, Energy, Environment, Material,
+    Bending, CoreError, Energy, Environment, InPlane, Material,
+    assembly::{Corners, ELEMENTS_PER_CHUNK, ROWS_PER_CHUNK},
+    forces::{
+        ForceModel,
+        air::Air,
+        hinge::{Hinges, LinearLaw, Rest, dihedral_angle},
+        spring::{Role, Springs},
+        stretch_shear::{Stiffness, StretchShear},
+    },
     mesh::{RestShape, Topology, TriMesh, Vec3},
 };
 
@@ -34,21 +44,81 @@ pub struct EffectInfo {
 /// The force models of all parts over one global vertex array.
 pub struct ClothSystem {
     masses: Vec<f64>,
+    gravity: Vec3,
+    wind: Vec3,
+    air_damping: f64,
+    models: Vec<Box<dyn ForceModel>>,
+    /// First entry of `corner_refs` of each vertex.
+    corner_offsets: Vec<u32>,
+    /// Corners of each vertex, over all models in order.
+    corner_refs: Vec<u32>,
 }
 
 impl ClothSystem {
     /// Builds what the parts' materials and the environment call for, over the global vertices
     /// `0..cloth_vertex_count`.
     ///
+    /// A stiffness, drag, lift or damping of zero builds nothing.
+    ///
     /// # Errors
     /// [`CoreError::Parameter`] for a value out of range, [`CoreError::Degenerate`] naming an element without extent,
-    /// [`CoreError::Length`] for arrays that do not belong together, [`CoreError::Massless`] for a vertex in no triangle.
+    /// [`CoreError::Mesh`] for bending across an edge of more than two triangles, [`CoreError::Length`] for arrays
+    /// that do not belong together, [`CoreError::Massless`] for a vertex in no triangle.
     pub fn new(
-        _parts: &[ClothPart<'_>],
-        _env: &Environment,
-        _cloth_vertex_count: usize,
+        parts: &[ClothPart<'_>],
+        env: &Environment,
+        cloth_vertex_count: usize,
     ) -> Result<Self, CoreError> {
-        todo!()
+        env.check()?;
+        let mut masses = vec![0.0; cloth_vertex_count];
+        let mut models: Vec<Box<dyn ForceModel>> = Vec::new();
+        let mut triangles = Vec::new();
+        for part in parts {
+            part.check(cloth_vertex_count)?;
+            let global = part.global_triangles();
+            for (triangle, area) in global.iter().zip(&part.rest.area) {
+                for &v in triangle {
+                    masses[v as usize] += part.material.areal_density * area / 3.0;
+                }
+            }
+            part.build_in_plane(&global, &mut models)?;
+            part.build_bending(&mut models)?;
+            triangles.extend(global);
+        }
+        if let Some(vertex) = masses.iter().position(|m| !(m.is_finite() && *m > 0.0)) {
+            return Err(CoreError::Massless { vertex });
+        }
+        if env.air_density > 0.0 && (env.drag > 0.0 || env.lift > 0.0) {
+            models.push(Box::new(Air {
+                wind: env.wind,
+                drag: 0.5 * env.air_density * env.drag,
+                lift: 0.5 * env.air_density * env.lift,
+                vertices: triangles,
+            }));
+        }
+
+        let mut corner_offsets = vec![0u32; cloth_vertex_count + 1];
+        for &v in models.iter().flat_map(|m| m.vertices()) {
+            corner_offsets[v as usize + 1] += 1;
+        }
+        for v in 0..cloth_vertex_count {
+            corner_offsets[v + 1] += corner_offsets[v];
+        }
+        let mut next = corner_offsets.clone();
+        let mut corner_refs = vec![0u32; corner_offsets[cloth_vertex_count] as usize];
+        for (corner, &v) in models.iter().flat_map(|m| m.vertices()).enumerate() {
+            corner_refs[next[v as usize] as usize] = corner as u32;
+            next[v as usize] += 1;
+        }
+        Ok(Self {
+            masses,
+            gravity: env.gravity,
+            wind: env.wind,
+            air_damping: env.air_damping,
+            models,
+            corner_offsets,
+            corner_refs,
+        })
     }
 
     /// Number of cloth vertices.
@@ -62,17 +132,235 @@ impl ClothSystem {
     }
 
     /// Energies of a state (positions [m], velocities [m/s]).
-    pub fn energy(&self, _x: &[Vec3], _v: &[Vec3]) -> Energy {
-        todo!()
+    pub fn energy(&self, x: &[Vec3], v: &[Vec3]) -> Energy {
+        let mut energy = Energy::default();
+        for model in &self.models {
+            model.add_energy(0..model.count(), x, &mut energy);
+        }
+        for ((m, x), v) in self.masses.iter().zip(x).zip(v) {
+            energy.kinetic += 0.5 * m * v.norm_squared();
+            energy.gravity -= m * self.gravity.dot(x);
+        }
+        energy
     }
 
     /// Forces on the cloth vertices [N] in a state, written over `out[..vertex_count]`.
-    pub fn forces(&self, _x: &[Vec3], _v: &[Vec3], _out: &mut [Vec3], _pool: &rayon::ThreadPool) {
-        todo!()
+    pub fn forces(&self, x: &[Vec3], v: &[Vec3], out: &mut [Vec3], pool: &rayon::ThreadPool) {
+        let mut corners = Corners::new(&self.models);
+        pool.install(|| self.evaluate(&mut corners, x, v, out));
     }
 
     /// What is built, in the order in which it is evaluated.
     pub fn effects(&self) -> Vec<EffectInfo> {
-        todo!()
+        let mut effects: Vec<_> = self.models.iter().map(|m| m.info()).collect();
+        let elements = self.vertex_count();
+        if self.gravity != Vec3::zeros() {
+            effects.push(EffectInfo { name: "gravity", elements, bytes: 0 });
+        }
+        if self.air_damping > 0.0 {
+            effects.push(EffectInfo { name: "air-damping", elements, bytes: 0 });
+        }
+        effects
+    }
+
+    pub(crate) fn models(&self) -> &[Box<dyn ForceModel>] {
+        &self.models
+    }
+
+    /// Rate c of the damping −c m (v − wind) [1/s].
+    pub(crate) fn air_damping(&self) -> f64 {
+        self.air_damping
+    }
+
+    /// Whether any force is not the gradient of [`Self::potential`].
+    pub(crate) fn dissipates(&self) -> bool {
+        self.models.iter().any(|m| m.dissipates())
+    }
+
+    /// Forces with work space of the caller's. Call on the pool.
+    pub(crate) fn evaluate(&self, corners: &mut Corners, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
+        corners.evaluate(&self.models, x, v);
+        self.gather(corners, v, 1.0, &mut out[..self.vertex_count()]);
+    }
+
+    /// `scale` times the sum of corner forces, gravity and air damping at each vertex. Call on the pool.
+    pub(crate) fn gather(&self, corners: &Corners, v: &[Vec3], scale: f64, out: &mut [Vec3]) {
+        out.par_chunks_mut(ROWS_PER_CHUNK).enumerate().for_each(|(chunk, out)| {
+            for (vertex, out) in (chunk * ROWS_PER_CHUNK..).zip(out) {
+                let external = self.gravity - (v[vertex] - self.wind) * self.air_damping;
+                let mut sum = external * self.masses[vertex];
+                let refs = self.corner_offsets[vertex] as usize..self.corner_offsets[vertex + 1] as usize;
+                for &corner in &self.corner_refs[refs] {
+                    sum += corners.forces[corner as usize];
+                }
+                *out = sum * scale;
+            }
+        });
+    }
+
+    /// Elastic and gravity energy, and the potential of air damping over a step: what the forces on a step's end are
+    /// the gradient of where no model dissipates. Summed by chunks in order. Call on the pool.
+    pub(crate) fn potential(&self, x: &[Vec3], v: &[Vec3], dt: f64) -> f64 {
+        let mut sum = 0.0;
+        for model in &self.models {
+            let count = model.count();
+            let parts: Vec<f64> = (0..count.div_ceil(ELEMENTS_PER_CHUNK))
+                .into_par_iter()
+                .map(|chunk| {
+                    let start = chunk * ELEMENTS_PER_CHUNK;
+                    let mut energy = Energy::default();
+                    model.add_energy(start..(start + ELEMENTS_PER_CHUNK).min(count), x, &mut energy);
+                    energy.elastic()
+                })
+                .collect();
+            sum += parts.iter().sum::<f64>();
+        }
+        for ((m, x), v) in self.masses.iter().zip(x).zip(v) {
+            let damping = 0.5 * dt * self.air_damping * (v - self.wind).norm_squared();
+            sum += m * (damping - self.gravity.dot(x));
+        }
+        sum
+    }
+}
+
+impl ClothPart<'_> {
+    fn check(&self, cloth_vertex_count: usize) -> Result<(), CoreError> {
+        self.material.check()?;
+        let (vertices, triangles) = (self.mesh.vertices.len(), self.mesh.triangles.len());
+        for (name, expected, got) in [
+            ("topology.vertex_count", vertices, self.topology.vertex_count),
+            ("topology.triangle_edges", triangles, self.topology.triangle_edges.len()),
+            ("rest.area", triangles, self.rest.area.len()),
+            ("rest.inverse", triangles, self.rest.inverse.len()),
+            ("rest.side_lengths", triangles, self.rest.side_lengths.len()),
+        ] {
+            if expected != got {
+                return Err(CoreError::Length { name, expected, got });
+            }
+        }
+        let got = self.first_vertex + vertices;
+        if got > cloth_vertex_count {
+            return Err(CoreError::Length { name: "cloth vertices", expected: cloth_vertex_count, got });
+        }
+        Ok(())
+    }
+
+    fn global<const N: usize>(&self, local: [u32; N]) -> [u32; N] {
+        local.map(|v| v + self.first_vertex as u32)
+    }
+
+    fn global_triangles(&self) -> Vec<[u32; 3]> {
+        self.mesh.triangles.iter().map(|&t| self.global(t)).collect()
+    }
+
+    fn build_in_plane(
+        &self,
+        triangles: &[[u32; 3]],
+        models: &mut Vec<Box<dyn ForceModel>>,
+    ) -> Result<(), CoreError> {
+        match self.material.in_plane {
+            InPlane::Spring { stiffness, damping } if stiffness > 0.0 || damping > 0.0 => {
+                let vertices = self.topology.edges.iter().map(|&e| self.global(e)).collect();
+                let lengths = self.edge_lengths();
+                models.push(Box::new(Springs::new(Role::InPlane, stiffness, damping, vertices, lengths)?));
+            }
+            InPlane::BaraffWitkin { warp, weft, shear, damping } if warp.max(weft).max(shear) > 0.0 => {
+                let stiffness = Stiffness { warp, weft, shear, damping };
+                models.push(Box::new(StretchShear::new(
+                    stiffness,
+                    triangles.to_vec(),
+                    &self.rest.inverse,
+                    &self.rest.area,
+                )?));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn build_bending(&self, models: &mut Vec<Box<dyn ForceModel>>) -> Result<(), CoreError> {
+        let bends = match self.material.bending {
+            Bending::None => false,
+            Bending::Spring { stiffness, damping } => stiffness > 0.0 || damping > 0.0,
+            Bending::Hinge { rigidity, .. } => rigidity > 0.0,
+        };
+        if !bends {
+            return Ok(());
+        }
+        self.topology.require_manifold()?;
+        let hinges = &self.topology.hinges;
+        if hinges.is_empty() {
+            return Ok(());
+        }
+        let lengths = self.edge_lengths();
+        let rest: Vec<Rest> = hinges
+            .iter()
+            .map(|hinge| {
+                let x = [hinge.edge[0], hinge.edge[1], hinge.opposite[0], hinge.opposite[1]]
+                    .map(|v| self.mesh.vertices[v as usize]);
+                let areas = hinge.triangles.map(|t| self.rest.area[t as usize]);
+                Rest::new(lengths[self.edge_of(hinge)], areas, dihedral_angle(&x))
+            })
+            .collect();
+        match self.material.bending {
+            Bending::None => {}
+            Bending::Spring { stiffness, damping } => {
+                let vertices = hinges.iter().map(|h| self.global(h.opposite)).collect();
+                let lengths = hinges.iter().zip(&rest).map(|(h, r)| self.opposite_distance(h, r)).collect();
+                models.push(Box::new(Springs::new(Role::Bending, stiffness, damping, vertices, lengths)?));
+            }
+            Bending::Hinge { rigidity, damping } => {
+                let corners = |h: &crate::mesh::Hinge| [h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]];
+                let vertices = hinges.iter().map(|h| self.global(corners(h))).collect();
+                models.push(Box::new(Hinges::new(LinearLaw { rigidity, damping }, vertices, rest)?));
+            }
+        }
+        Ok(())
+    }
+
+    /// Rest length of each edge: the mean over the triangles that have it, whose panels may differ at a seam [m].
+    fn edge_lengths(&self) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0u32); self.topology.edges.len()];
+        for (edges, lengths) in self.topology.triangle_edges.iter().zip(&self.rest.side_lengths) {
+            for (&edge, length) in edges.iter().zip(lengths) {
+                let sum = &mut sums[edge as usize];
+                sum.0 += length;
+                sum.1 += 1;
+            }
+        }
+        sums.iter().map(|&(sum, count)| sum / f64::from(count)).collect()
+    }
+
+    /// Edge of a hinge.
+    fn edge_of(&self, hinge: &crate::mesh::Hinge) -> usize {
+        let [a, b] = hinge.edge;
+        let key = [a.min(b), a.max(b)];
+        let edges = self.topology.triangle_edges[hinge.triangles[0] as usize];
+        edges.into_iter().find(|&e| self.topology.edges[e as usize] == key).unwrap_or(edges[0]) as usize
+    }
+
+    /// Rest distance of a hinge's opposite vertices: its two rest triangles at its rest angle [m].
+    fn opposite_distance(&self, hinge: &crate::mesh::Hinge, rest: &Rest) -> f64 {
+        // Height over the edge and foot along it, from the side that starts at edge[0].
+        let flap = |which: usize| {
+            let t = hinge.triangles[which] as usize;
+            let triangle = self.mesh.triangles[t];
+            let lengths = self.rest.side_lengths[t];
+            let height = 2.0 * self.rest.area[t] / rest.edge;
+            let side = |from: u32| {
+                let pair = [from, hinge.opposite[which]];
+                (0..3)
+                    .find(|&s| {
+                        let ends = [triangle[s], triangle[(s + 1) % 3]];
+                        ends == pair || ends == [pair[1], pair[0]]
+                    })
+                    .map_or(rest.edge, |s| lengths[s])
+            };
+            let (near, far) = (side(hinge.edge[0]), side(hinge.edge[1]));
+            let foot = (near * near - far * far + rest.edge * rest.edge) / (2.0 * rest.edge);
+            (foot, height)
+        };
+        let ((s0, h0), (s1, h1)) = (flap(0), flap(1));
+        ((s0 - s1).powi(2) + h0 * h0 + h1 * h1 + 2.0 * h0 * h1 * rest.angle.cos()).sqrt()
     }
 }

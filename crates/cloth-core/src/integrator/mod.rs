@@ -1,5 +1,12 @@
 //! From one state to the next.
 
+mod explicit;
+mod implicit;
+mod implicit_euler;
+mod line_search;
+mod newton;
+mod stability;
+
 use std::sync::Arc;
 
 use crate::{ClothSystem, CoreError, Psd, SolverParams, StepError, mesh::Vec3};
@@ -90,6 +97,17 @@ pub struct StepInfo {
 /// Advances the state of a [`ClothSystem`]. Holds work space only: a step depends on its arguments alone.
 pub struct Integrator {
     system: ClothSystem,
+    params: IntegratorParams,
+    pool: Arc<rayon::ThreadPool>,
+    /// Which vertices are pinned in the step under way; all false between steps.
+    pinned: Vec<bool>,
+    work: Work,
+}
+
+/// Work space of the scheme in use.
+enum Work {
+    Explicit(explicit::Buffers),
+    Implicit(Box<implicit::Workspace>),
 }
 
 impl Integrator {
@@ -98,11 +116,33 @@ impl Integrator {
     /// # Errors
     /// [`CoreError::Parameter`] for a tolerance that is not positive or a cap of zero.
     pub fn new(
-        _system: ClothSystem,
-        _params: IntegratorParams,
-        _pool: Arc<rayon::ThreadPool>,
+        system: ClothSystem,
+        params: IntegratorParams,
+        pool: Arc<rayon::ThreadPool>,
     ) -> Result<Self, CoreError> {
-        todo!()
+        for (name, got) in [
+            ("solver.tolerance", params.solver.tolerance),
+            ("newton_tolerance", params.newton_tolerance),
+        ] {
+            if !(got.is_finite() && got > 0.0) {
+                return Err(CoreError::Parameter { name, expected: "a value > 0", got });
+            }
+        }
+        for (name, got) in [
+            ("solver.max_iterations", params.solver.max_iterations),
+            ("newton_max_iterations", params.newton_max_iterations),
+        ] {
+            if got == 0 {
+                return Err(CoreError::Parameter { name, expected: "a count ≥ 1", got: 0.0 });
+            }
+        }
+        let work = if params.method.is_explicit() {
+            Work::Explicit(explicit::Buffers::new(&system))
+        } else {
+            Work::Implicit(Box::new(implicit::Workspace::new(&system, &params)))
+        };
+        let pinned = vec![false; system.vertex_count()];
+        Ok(Self { system, params, pool, pinned, work })
     }
 
     /// The system that is stepped.
@@ -110,26 +150,108 @@ impl Integrator {
         &self.system
     }
 
+    /// The parameters it steps with.
+    pub fn params(&self) -> &IntegratorParams {
+        &self.params
+    }
+
+    /// Memory of work space, matrix and slot maps [B].
+    pub fn bytes(&self) -> usize {
+        match &self.work {
+            Work::Explicit(buffers) => buffers.bytes(),
+            Work::Implicit(work) => work.bytes(),
+        }
+    }
+
     /// Advances the cloth vertices of `x` [m] and `v` [m/s] from `time` to `time + dt` [s] without contact. Entries
     /// past the cloth vertices are not touched.
     ///
-    /// Pinned vertices end exactly at their targets. After an implicit step x_t1 = x_t0 + dt v_t1 at all others.
+    /// Pinned vertices end exactly at their targets; in between, implicit schemes move them at
+    /// (x_t1 − x_t0)/dt and stages of explicit schemes along the cubic with the positions and velocities of both
+    /// ends. After an implicit step x_t1 = x_t0 + dt v_t1 at all others.
     ///
     /// # Errors
     /// [`StepError`]; the state is then unchanged. Reaching a cap is no error: see [`StepInfo::converged`].
     pub fn step(
         &mut self,
-        _x: &mut [Vec3],
-        _v: &mut [Vec3],
+        x: &mut [Vec3],
+        v: &mut [Vec3],
         _time: f64,
-        _dt: f64,
-        _pins: &Pins<'_>,
+        dt: f64,
+        pins: &Pins<'_>,
     ) -> Result<StepInfo, StepError> {
-        todo!()
+        if !(dt.is_finite() && dt > 0.0) {
+            return Err(StepError::TimeStep { got: dt });
+        }
+        let n = self.system.vertex_count();
+        for (name, got) in [("x", x.len()), ("v", v.len())] {
+            if got < n {
+                return Err(StepError::Length { name, expected: n, got });
+            }
+        }
+        pins.check(n)?;
+        for &vertex in pins.vertices {
+            self.pinned[vertex as usize] = true;
+        }
+        let (x, v) = (&mut x[..n], &mut v[..n]);
+        let Self { system, params, pool, pinned, work } = self;
+        let result = pool.install(|| match work {
+            Work::Explicit(buffers) => {
+                Ok(buffers.step(system, params.method, x, v, dt, &Prescribed { pins, pinned }))
+            }
+            Work::Implicit(work) => {
+                let pins = Prescribed { pins, pinned };
+                if params.method == Method::ImplicitNewton {
+                    newton::step(work, system, params, x, v, dt, &pins)
+                } else {
+                    implicit_euler::step(work, system, params, x, v, dt, &pins)
+                }
+            }
+        });
+        for &vertex in pins.vertices {
+            self.pinned[vertex as usize] = false;
+        }
+        result
     }
 
     /// Estimate of the largest stable step of the explicit scheme at a state [s]; infinite for implicit schemes.
-    pub fn stable_step(&self, _x: &[Vec3], _v: &[Vec3]) -> f64 {
-        todo!()
+    ///
+    /// The largest vibration modes of the linearised system come from a Lanczos iteration; the estimate is the largest
+    /// step at which none of them grows, or grows by less than a factor e per second: without damping, explicit Euler
+    /// and midpoint amplify every mode a little at any step.
+    pub fn stable_step(&self, x: &[Vec3], v: &[Vec3]) -> f64 {
+        if !self.params.method.is_explicit() {
+            return f64::INFINITY;
+        }
+        self.pool.install(|| stability::stable_step(&self.system, self.params.method, x, v))
+    }
+}
+
+impl Pins<'_> {
+    fn check(&self, vertex_count: usize) -> Result<(), StepError> {
+        let n = self.vertices.len();
+        if self.x_t1.len() != n || self.v_t1.len() != n {
+            return Err(StepError::Pins { entry: n.min(self.x_t1.len()).min(self.v_t1.len()) });
+        }
+        let wrong = (0..n).find(|&i| {
+            self.vertices[i] as usize >= vertex_count || (i > 0 && self.vertices[i - 1] >= self.vertices[i])
+        });
+        wrong.map_or(Ok(()), |entry| Err(StepError::Pins { entry }))
+    }
+}
+
+/// Pins of the step under way with their mask.
+struct Prescribed<'a> {
+    pins: &'a Pins<'a>,
+    pinned: &'a [bool],
+}
+
+impl Prescribed<'_> {
+    /// Puts the pinned vertices at their targets.
+    fn place(&self, x: &mut [Vec3], v: &mut [Vec3]) {
+        for ((&vertex, x_t1), v_t1) in self.pins.vertices.iter().zip(self.pins.x_t1).zip(self.pins.v_t1) {
+            x[vertex as usize] = *x_t1;
+            v[vertex as usize] = *v_t1;
+        }
     }
 }

@@ -1,4 +1,14 @@
-//! The linear solver of the implicit schemes: Params, Info, Error.
+//! The linear solvers of the implicit schemes: Params, Info, Error.
+//!
+//! All three solve the same system: prescribed vertices are eliminated, A_ff x_f = b_f − A_fp x_p, and residuals are
+//! those of that system relative to its right-hand side.
+
+mod pcg;
+
+use crate::{
+    assembly::{BlockMatrix, Pattern},
+    mesh::Vec3,
+};
 
 /// Which solver.
 #[derive(
@@ -63,4 +73,39 @@ pub enum SolveError {
         /// What was met.
         value: f64,
     },
+}
+
+/// A solver with its work space, for one sparsity pattern.
+pub(crate) enum Solver {
+    Pcg(pcg::Pcg),
+}
+
+impl Solver {
+    pub(crate) fn new(method: SolverMethod, pattern: &Pattern) -> Self {
+        match method {
+            _ => Self::Pcg(pcg::Pcg::new(pattern.rows)),
+        }
+    }
+
+    /// Memory of its work space [B].
+    pub(crate) fn bytes(&self) -> usize {
+        match self {
+            Self::Pcg(pcg) => pcg.bytes(),
+        }
+    }
+
+    /// Solves A x = b for the free vertices; `x` holds the prescribed values on entry, the solution on return. Call on
+    /// the pool.
+    pub(crate) fn solve(
+        &mut self,
+        a: &BlockMatrix,
+        b: &[Vec3],
+        pinned: &[bool],
+        x: &mut [Vec3],
+        params: &SolverParams,
+    ) -> Result<SolveInfo, SolveError> {
+        match self {
+            Self::Pcg(pcg) => pcg.solve(a, b, pinned, x, params.tolerance, params.max_iterations),
+        }
+    }
 }

@@ -1,0 +1,114 @@
+//! What elements write: corner forces and couplings, in arrays per model.
+
+use rayon::prelude::*;
+
+use super::ELEMENTS_PER_CHUNK;
+use crate::{
+    forces::{Block, CouplingKind, Couplings, ForceModel, Linear, Outer, Psd, corner_pairs},
+    mesh::Vec3,
+};
+
+/// Room for the couplings of every element of every model.
+pub(crate) struct ElementBuffers {
+    pub(crate) blocks: Vec<Block>,
+    pub(crate) outer: Vec<Outer>,
+    pub(crate) diagonal: Vec<f64>,
+}
+
+/// Room for the corner forces of every element of every model.
+pub(crate) struct Corners {
+    pub(crate) forces: Vec<Vec3>,
+}
+
+impl Corners {
+    pub(crate) fn new(models: &[Box<dyn ForceModel>]) -> Self {
+        Self { forces: vec![Vec3::zeros(); models.iter().map(|m| m.vertices().len()).sum()] }
+    }
+
+    /// Evaluates the forces of all models. Call on the pool.
+    pub(crate) fn evaluate(&mut self, models: &[Box<dyn ForceModel>], x: &[Vec3], v: &[Vec3]) {
+        let mut rest = self.forces.as_mut_slice();
+        for model in models {
+            let corners = model.corners();
+            let (mine, others) = rest.split_at_mut(model.vertices().len());
+            rest = others;
+            mine.par_chunks_mut(ELEMENTS_PER_CHUNK * corners).enumerate().for_each(|(chunk, out)| {
+                let start = chunk * ELEMENTS_PER_CHUNK;
+                model.forces(start..start + out.len() / corners, x, v, out);
+            });
+        }
+    }
+}
+
+impl ElementBuffers {
+    pub(crate) fn new(models: &[Box<dyn ForceModel>], psd: Psd) -> Self {
+        let (mut blocks, mut outer, mut diagonal) = (0, 0, 0);
+        for model in models {
+            match model.coupling(psd) {
+                CouplingKind::Blocks => blocks += model.count() * corner_pairs(model.corners()).len(),
+                CouplingKind::Outer => outer += model.count(),
+                CouplingKind::Diagonal => diagonal += model.count(),
+            }
+        }
+        Self {
+            blocks: vec![[0.0; 9]; blocks],
+            outer: vec![Outer { gradient: [[0.0; 3]; 4], scale: 0.0 }; outer],
+            diagonal: vec![0.0; diagonal],
+        }
+    }
+
+    /// Evaluates corner forces and couplings of all models. Call on the pool.
+    pub(crate) fn linearise(
+        &mut self,
+        models: &[Box<dyn ForceModel>],
+        corners: &mut Corners,
+        x: &[Vec3],
+        v: &[Vec3],
+        linear: &Linear,
+    ) {
+        let mut forces = corners.forces.as_mut_slice();
+        let (mut blocks, mut outer, mut diagonal) =
+            (self.blocks.as_mut_slice(), self.outer.as_mut_slice(), self.diagonal.as_mut_slice());
+        for model in models {
+            let n = model.corners();
+            let (f, others) = forces.split_at_mut(model.vertices().len());
+            forces = others;
+            let f = f.par_chunks_mut(ELEMENTS_PER_CHUNK * n).enumerate();
+            let range = |chunk: usize, f: &[Vec3]| {
+                let start = chunk * ELEMENTS_PER_CHUNK;
+                start..start + f.len() / n
+            };
+            match model.coupling(linear.psd) {
+                CouplingKind::Blocks => {
+                    let per_element = corner_pairs(n).len();
+                    let (mine, others) = blocks.split_at_mut(model.count() * per_element);
+                    blocks = others;
+                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK * per_element)).for_each(|((chunk, f), c)| {
+                        model.linearise(range(chunk, f), x, v, linear, f, Couplings::Blocks(c));
+                    });
+                }
+                CouplingKind::Outer => {
+                    let (mine, others) = outer.split_at_mut(model.count());
+                    outer = others;
+                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|((chunk, f), c)| {
+                        model.linearise(range(chunk, f), x, v, linear, f, Couplings::Outer(c));
+                    });
+                }
+                CouplingKind::Diagonal => {
+                    let (mine, others) = diagonal.split_at_mut(model.count());
+                    diagonal = others;
+                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|((chunk, f), c)| {
+                        model.linearise(range(chunk, f), x, v, linear, f, Couplings::Diagonal(c));
+                    });
+                }
+            }
+        }
+    }
+
+    /// Memory [B].
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.blocks.as_slice())
+            + size_of_val(self.outer.as_slice())
+            + size_of_val(self.diagonal.as_slice())
+    }
+}

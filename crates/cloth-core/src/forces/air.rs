@@ -1,0 +1,96 @@
+//! Drag and lift of moving air on triangles.
+//!
+//! u = wind − (v_0 + v_1 + v_2)/3 the air's velocity relative to the triangle [m/s], n its unit normal, A its present area [m²]:
+//! drag F = ½ ρ C_D A |n·u| u, lift F = ½ ρ C_L A (n·u) (|u| n − (n·u) u/|u|)   [N], a third on each corner.
+//!
+//! Both vanish for flow along the surface and do not depend on which side is the front. Lift is perpendicular to the
+//! flow with |F| ∝ sin α cos α |u|² (α between flow and normal). They have no energy.
+//!
+//! Couplings: the drag's −∂F/∂v at frozen |n·u|, lumped to the corners' diagonals: ½ ρ C_D A |n·u|/3 I ≥ 0.
+//! A collapsed triangle has no area and no force.
+
+use std::ops::Range;
+
+use super::{CouplingKind, Couplings, ForceModel, Linear, Psd};
+use crate::{Energy, mesh::Vec3, system::EffectInfo};
+
+/// Drag and lift on the triangles of all cloth.
+pub(crate) struct Air {
+    pub(crate) wind: Vec3,
+    /// ½ ρ C_D [kg/m³].
+    pub(crate) drag: f64,
+    /// ½ ρ C_L [kg/m³].
+    pub(crate) lift: f64,
+    pub(crate) vertices: Vec<[u32; 3]>,
+}
+
+impl Air {
+    /// Force on each corner [N] and drag per relative velocity of each corner [N s/m].
+    #[inline]
+    fn corner(&self, element: usize, x: &[Vec3], v: &[Vec3]) -> (Vec3, f64) {
+        let [a, b, c] = self.vertices[element].map(|i| i as usize);
+        // |area_normal| is the area.
+        let area_normal = (x[b] - x[a]).cross(&(x[c] - x[a])) * 0.5;
+        let u = self.wind - (v[a] + v[b] + v[c]) / 3.0;
+        let flux = area_normal.dot(&u);
+        let drag = self.drag * flux.abs() / 3.0;
+        let mut force = u * drag;
+        let (area, speed) = (area_normal.norm(), u.norm());
+        if self.lift > 0.0 && area > 0.0 && speed > 0.0 {
+            let normal = area_normal / area;
+            force += (normal * speed - u * (normal.dot(&u) / speed)) * (self.lift * flux / 3.0);
+        }
+        (force, drag)
+    }
+}
+
+impl ForceModel for Air {
+    fn info(&self) -> EffectInfo {
+        EffectInfo {
+            name: "wind",
+            elements: self.vertices.len(),
+            bytes: size_of_val(self.vertices.as_slice()),
+        }
+    }
+
+    fn corners(&self) -> usize {
+        3
+    }
+
+    fn vertices(&self) -> &[u32] {
+        self.vertices.as_flattened()
+    }
+
+    fn coupling(&self, _psd: Psd) -> CouplingKind {
+        CouplingKind::Diagonal
+    }
+
+    fn dissipates(&self) -> bool {
+        true
+    }
+
+    fn add_energy(&self, _range: Range<usize>, _x: &[Vec3], _energy: &mut Energy) {}
+
+    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
+        for (element, f) in range.zip(out.chunks_exact_mut(3)) {
+            f.fill(self.corner(element, x, v).0);
+        }
+    }
+
+    fn linearise(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        linear: &Linear,
+        forces: &mut [Vec3],
+        couplings: Couplings<'_>,
+    ) {
+        let Couplings::Diagonal(diagonal) = couplings else { unreachable!("air acts on diagonals") };
+        for ((element, f), diagonal) in range.zip(forces.chunks_exact_mut(3)).zip(diagonal) {
+            let (force, drag) = self.corner(element, x, v);
+            f.fill(force);
+            *diagonal = linear.damping * drag;
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! Bending across hinges: two triangles that share an edge.
+//!
+//! E = Σ |e| h̄ Ψ(K)   [J],   K = (θ − θ_0)/h̄   [1/m],   Ψ' = M
+//!
+//! Corners 0, 1 are the shared edge, 2 and 3 the opposite vertices; e = x_1 − x_0, l_0 = x_2 − x_0, l_1 = x_3 − x_0,
+//! n_0 = e × l_0, n_1 = l_1 × e. θ = atan2((n_0 × n_1)·ê, n_0·n_1) ∈ [−π, π] is zero when flat and ±π when folded flat;
+//! θ_0 its value in the mesh as it came; |e| the rest length of the edge [m]; h̄ the mean of the two rest heights over it
+//! [m]; M(K) the moment per width [N] of a [`BendingLaw`]. The linear law M = B K with the rigidity B [N m] has
+//! E = |e| B (θ − θ_0)²/(2 h̄) and makes B the rigidity that a textile laboratory measures.
+//!
+//! Torque |e| M, force −|e| M dθ/dx with the exact gradient (t_i = l_i·e/|e|²):
+//! dθ/dx_2 = −|e| n_0/|n_0|², dθ/dx_3 = −|e| n_1/|n_1|², dθ/dx_0 = −(1 − t_0) dθ/dx_2 − (1 − t_1) dθ/dx_3,
+//! dθ/dx_1 = −t_0 dθ/dx_2 − t_1 dθ/dx_3: forces and moments sum to zero.
+//!
+//! Damping (3.8): torque |e| D θ̇/h̄ with the law's damping D [N m s].
+//!
+//! A triangle flatter than 10⁻⁴ of its rest area has its gradient scaled down to zero with its normal, so forces stay
+//! finite; there the force is no longer the exact gradient of E.
+//!
+//! Sources: thesis (3.9), (3.28), (3.29) with atan2 and mesh-independent weights; Pabst et al. 2008 for K.
+
+use std::ops::Range;
+
+use super::{CouplingKind, Couplings, ForceModel, Linear, Psd, corner_pairs};
+use crate::{CoreError, Energy, mesh::Vec3, system::EffectInfo};
+
+/// Area relative to rest under which a triangle's normal no longer gives a full gradient.
+const COLLAPSED: f64 = 1e-4;
+
+/// What a law answers at one curvature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Moment {
+    /// M: moment per width [N].
+    pub(crate) moment: f64,
+    /// dM/dK [N m].
+    pub(crate) slope: f64,
+    /// Ψ: stored energy per area, up to the law's definition of what is stored [J/m²].
+    pub(crate) energy: f64,
+}
+
+/// A moment–curvature law of one material. Kernels are compiled once per law.
+pub(crate) trait BendingLaw: Send + Sync {
+    /// Name of the effect.
+    const NAME: &'static str;
+    /// Moment, slope and energy of hinge `element` at `curvature` [1/m].
+    fn moment(&self, element: usize, curvature: f64) -> Moment;
+    /// Damping moment per width and rate of curvature [N m s].
+    fn damping(&self) -> f64;
+}
+
+/// M = B K.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct LinearLaw {
+    /// B [N m].
+    pub(crate) rigidity: f64,
+    /// Damping time [s].
+    pub(crate) damping: f64,
+}
+
+impl BendingLaw for LinearLaw {
+    const NAME: &'static str = "hinge";
+
+    #[inline]
+    fn moment(&self, _element: usize, curvature: f64) -> Moment {
+        let moment = self.rigidity * curvature;
+        Moment { moment, slope: self.rigidity, energy: 0.5 * moment * curvature }
+    }
+
+    fn damping(&self) -> f64 {
+        self.damping * self.rigidity
+    }
+}
+
+/// Hinges with one law.
+pub(crate) struct Hinges<L> {
+    law: L,
+    vertices: Vec<[u32; 4]>,
+    rest: Vec<Rest>,
+}
+
+/// Rest data of one hinge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Rest {
+    /// Length of the shared edge [m].
+    pub(crate) edge: f64,
+    /// Mean height of the two triangles over it [m].
+    pub(crate) height: f64,
+    /// Angle in the undeformed state [rad].
+    pub(crate) angle: f64,
+    /// Least |n|² that gives a full gradient, per triangle [m⁴].
+    floor: [f64; 2],
+}
+
+impl Rest {
+    /// From the edge's rest length [m], the two rest areas [m²] and the rest angle [rad].
+    pub(crate) fn new(edge: f64, areas: [f64; 2], angle: f64) -> Self {
+        let floor = areas.map(|a| (2.0 * COLLAPSED * a).powi(2));
+        Self { edge, height: (areas[0] + areas[1]) / edge, angle, floor }
+    }
+}
+
+/// Angle and its gradient at one state.
+#[derive(Clone, Copy)]
+struct Angle {
+    value: f64,
+    gradient: [Vec3; 4],
+}
+
+/// Signed dihedral angle [rad] of corners (e0, e1, opposite, opposite).
+pub(crate) fn dihedral_angle(x: &[Vec3; 4]) -> f64 {
+    let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+    let (n0, n1) = (e.cross(&l0), l1.cross(&e));
+    // (n_0 × n_1)·ê = −|e| n_0·l_1, exact in sign even when folded flat.
+    (-e.norm() * n0.dot(&l1)).atan2(n0.dot(&n1))
+}
+
+impl<L: BendingLaw> Hinges<L> {
+    /// Hinges over global `vertices` (e0, e1, opposite, opposite) with their rest data.
+    ///
+    /// # Errors
+    /// [`CoreError::Degenerate`] for a hinge whose edge or height is not positive.
+    pub(crate) fn new(law: L, vertices: Vec<[u32; 4]>, rest: Vec<Rest>) -> Result<Self, CoreError> {
+        for (element, r) in rest.iter().enumerate() {
+            for (measure, got) in [("rest edge in m", r.edge), ("rest height in m", r.height)] {
+                if !(got.is_finite() && got > 0.0) {
+                    let vertices = vertices[element].to_vec();
+                    return Err(CoreError::Degenerate { model: L::NAME, element, vertices, measure, got });
+                }
+            }
+        }
+        Ok(Self { law, vertices, rest })
+    }
+
+    #[inline]
+    fn corners_of(&self, element: usize, x: &[Vec3]) -> [Vec3; 4] {
+        self.vertices[element].map(|i| x[i as usize])
+    }
+
+    #[inline]
+    fn angle(rest: &Rest, x: &[Vec3; 4]) -> Angle {
+        let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+        let (n0, n1) = (e.cross(&l0), l1.cross(&e));
+        let e2 = e.norm_squared();
+        let length = e2.sqrt();
+        let value = (-length * n0.dot(&l1)).atan2(n0.dot(&n1));
+        let g2 = n0 * (-length / n0.norm_squared().max(rest.floor[0]));
+        let g3 = n1 * (-length / n1.norm_squared().max(rest.floor[1]));
+        let inverse = 1.0 / e2.max(rest.edge * rest.edge * COLLAPSED * COLLAPSED);
+        let (t0, t1) = (l0.dot(&e) * inverse, l1.dot(&e) * inverse);
+        let g1 = -(g2 * t0 + g3 * t1);
+        let g0 = -(g1 + g2 + g3);
+        Angle { value, gradient: [g0, g1, g2, g3] }
+    }
+
+    /// dθ/dx's change along corner motions `d`: the exact second derivative of θ applied to `d`.
+    fn gradient_change(rest: &Rest, x: &[Vec3; 4], d: &[Vec3; 4]) -> [Vec3; 4] {
+        let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+        let (de, dl0, dl1) = (d[1] - d[0], d[2] - d[0], d[3] - d[0]);
+        let (n0, n1) = (e.cross(&l0), l1.cross(&e));
+        let (dn0, dn1) = (de.cross(&l0) + e.cross(&dl0), dl1.cross(&e) + l1.cross(&de));
+        let e2 = e.norm_squared().max(rest.edge * rest.edge * COLLAPSED * COLLAPSED);
+        let length = e2.sqrt();
+        let dlength = e.dot(&de) / length;
+        let flap = |n: &Vec3, dn: &Vec3, floor: f64| {
+            let n2 = n.norm_squared().max(floor);
+            let g = n * (-length / n2);
+            let dg = -(n * dlength + dn * length) / n2 + n * (2.0 * length * n.dot(dn) / (n2 * n2));
+            (g, dg)
+        };
+        let ((g2, dg2), (g3, dg3)) = (flap(&n0, &dn0, rest.floor[0]), flap(&n1, &dn1, rest.floor[1]));
+        let ratio = |l: &Vec3, dl: &Vec3| {
+            let t = l.dot(&e) / e2;
+            (t, (dl.dot(&e) + l.dot(&de) - 2.0 * t * e.dot(&de)) / e2)
+        };
+        let ((t0, dt0), (t1, dt1)) = (ratio(&l0, &dl0), ratio(&l1, &dl1));
+        let dg1 = -(g2 * dt0 + dg2 * t0 + g3 * dt1 + dg3 * t1);
+        [-(dg1 + dg2 + dg3), dg1, dg2, dg3]
+    }
+}
+
+impl<L: BendingLaw> ForceModel for Hinges<L> {
+    fn info(&self) -> EffectInfo {
+        EffectInfo {
+            name: L::NAME,
+            elements: self.vertices.len(),
+            bytes: size_of_val(self.vertices.as_slice()) + size_of_val(self.rest.as_slice()),
+        }
+    }
+
+    fn corners(&self) -> usize {
+        4
+    }
+
+    fn vertices(&self) -> &[u32] {
+        self.vertices.as_flattened()
+    }
+
+    fn coupling(&self, psd: Psd) -> CouplingKind {
+        match psd {
+            Psd::Raw => CouplingKind::Blocks,
+            Psd::Projected => CouplingKind::Outer,
+        }
+    }
+
+    fn dissipates(&self) -> bool {
+        self.law.damping() > 0.0
+    }
+
+    fn add_energy(&self, range: Range<usize>, x: &[Vec3], energy: &mut Energy) {
+        for element in range {
+            let rest = &self.rest[element];
+            let curvature = (dihedral_angle(&self.corners_of(element, x)) - rest.angle) / rest.height;
+            energy.bending += rest.edge * rest.height * self.law.moment(element, curvature).energy;
+        }
+    }
+
+    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
+        let damping = self.law.damping();
+        for (element, f) in range.zip(out.chunks_exact_mut(4)) {
+            let rest = &self.rest[element];
+            let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
+            let curvature = (value - rest.angle) / rest.height;
+            let mut torque = rest.edge * self.law.moment(element, curvature).moment;
+            if damping > 0.0 {
+                let rate: f64 = (0..4).map(|c| gradient[c].dot(&v[self.vertices[element][c] as usize])).sum();
+                torque += rest.edge * damping / rest.height * rate;
+            }
+            for c in 0..4 {
+                f[c] = gradient[c] * -torque;
+            }
+        }
+    }
+
+    fn linearise(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        linear: &Linear,
+        forces: &mut [Vec3],
+        couplings: Couplings<'_>,
+    ) {
+        let damping = self.law.damping();
+        let first = range.start;
+        match couplings {
+            Couplings::Outer(outer) => {
+                for ((element, f), outer) in range.zip(forces.chunks_exact_mut(4)).zip(outer) {
+                    let rest = &self.rest[element];
+                    let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
+                    let [v0, v1, v2, v3] = self.corners_of(element, v);
+                    // Σ g_a = 0, so the rate needs differences only.
+                    let rate =
+                        gradient[1].dot(&(v1 - v0)) + gradient[2].dot(&(v2 - v0)) + gradient[3].dot(&(v3 - v0));
+                    let answer = self.law.moment(element, (value - rest.angle) / rest.height);
+                    let per_angle = rest.edge / rest.height;
+                    // A negative slope has no place in a positive semi-definite block.
+                    let stiffness = per_angle * answer.slope.max(0.0);
+                    let damping = per_angle * damping;
+                    let torque = rest.edge * answer.moment + (damping + linear.ahead * stiffness) * rate;
+                    for c in 0..4 {
+                        f[c] = gradient[c] * -torque;
+                        outer.gradient[c] = [gradient[c].x, gradient[c].y, gradient[c].z];
+                    }
+                    outer.scale = linear.stiffness * stiffness + linear.damping * damping;
+                }
+            }
+            Couplings::Blocks(blocks) => {
+                for ((element, f), blocks) in range.zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6)) {
+                    let rest = &self.rest[element];
+                    let corners = self.corners_of(element, x);
+                    let velocity = self.corners_of(element, v);
+                    let Angle { value, gradient } = Self::angle(rest, &corners);
+                    let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
+                    let answer = self.law.moment(element, (value - rest.angle) / rest.height);
+                    let per_angle = rest.edge / rest.height;
+                    let (stiffness, damping) = (per_angle * answer.slope, per_angle * damping);
+                    let moment = rest.edge * answer.moment;
+                    let torque = moment + (damping + linear.ahead * stiffness) * rate;
+                    let change = Self::gradient_change(rest, &corners, &velocity);
+                    for c in 0..4 {
+                        f[c] = gradient[c] * -torque - change[c] * (linear.ahead * moment);
+                    }
+                    let scale = linear.stiffness * stiffness + linear.damping * damping;
+                    for b in 0..4 {
+                        for axis in 0..3 {
+                            let mut direction = [Vec3::zeros(); 4];
+                            direction[b][axis] = 1.0;
+                            let change = Self::gradient_change(rest, &corners, &direction);
+                            for (p, &(row, column)) in corner_pairs(4).iter().enumerate() {
+                                if column == b {
+                                    let entry = gradient[row] * (scale * gradient[b][axis])
+                                        + change[row] * (linear.stiffness * moment);
+                                    blocks[p][3 * axis..3 * axis + 3].copy_from_slice(entry.as_slice());
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            Couplings::Diagonal(_) => unreachable!("hinges couple by blocks, element {first}"),
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! What the implicit schemes share: matrix, right-hand side, solver.
+
+use std::{sync::Arc, time::Instant};
+
+use super::{IntegratorParams, Prescribed};
+use crate::{
+    ClothSystem, Psd,
+    assembly::{Assembler, BlockMatrix, Corners},
+    forces::Linear,
+    mesh::Vec3,
+    solver::{SolveError, SolveInfo, Solver},
+};
+
+/// Work space of the implicit schemes.
+pub(super) struct Workspace {
+    pub(super) corners: Corners,
+    pub(super) assembler: Assembler,
+    pub(super) matrix: BlockMatrix,
+    pub(super) solver: Solver,
+    pub(super) b: Vec<Vec3>,
+    pub(super) dv: Vec<Vec3>,
+    pub(super) clock: Clock,
+    /// Trial state of Newton's method.
+    pub(super) x: Vec<Vec3>,
+    pub(super) v: Vec<Vec3>,
+    pub(super) residual: Vec<Vec3>,
+}
+
+/// Seconds per stage of one step.
+#[derive(Default)]
+pub(super) struct Clock {
+    linearise: f64,
+    assemble: f64,
+    solve: f64,
+    pub(super) line_search: f64,
+}
+
+impl Clock {
+    pub(super) fn seconds(&self) -> Vec<(&'static str, f64)> {
+        let mut seconds =
+            vec![("linearise", self.linearise), ("assemble", self.assemble), ("solve", self.solve)];
+        if self.line_search > 0.0 {
+            seconds.push(("line search", self.line_search));
+        }
+        seconds
+    }
+}
+
+impl Workspace {
+    pub(super) fn new(system: &ClothSystem, params: &IntegratorParams) -> Self {
+        let (assembler, pattern) = Assembler::new(system.vertex_count(), system.models(), params.psd);
+        let solver = Solver::new(params.solver.method, &pattern);
+        let newton = params.method == super::Method::ImplicitNewton;
+        let trial = || vec![Vec3::zeros(); if newton { system.vertex_count() } else { 0 }];
+        Self {
+            corners: Corners::new(system.models()),
+            assembler,
+            matrix: BlockMatrix::new(Arc::new(pattern)),
+            solver,
+            b: vec![Vec3::zeros(); system.vertex_count()],
+            dv: vec![Vec3::zeros(); system.vertex_count()],
+            clock: Clock::default(),
+            x: trial(),
+            v: trial(),
+            residual: trial(),
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.assembler.bytes()
+            + self.matrix.bytes()
+            + self.solver.bytes()
+            + size_of::<Vec3>()
+                * (self.corners.forces.len() + self.b.len() + self.dv.len() + 3 * self.x.len())
+    }
+
+    /// A = M − dt K_v − dt² K_x at (x, v), and the corner forces f + `ahead` K_x v.
+    pub(super) fn linearise(
+        &mut self,
+        system: &ClothSystem,
+        psd: Psd,
+        x: &[Vec3],
+        v: &[Vec3],
+        dt: f64,
+        ahead: f64,
+    ) {
+        let start = Instant::now();
+        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, psd };
+        self.assembler.elements.linearise(system.models(), &mut self.corners, x, v, &linear);
+        let middle = Instant::now();
+        let masses = system.masses();
+        let scale = 1.0 + dt * system.air_damping();
+        self.assembler.gather(&mut self.matrix, &|row| scale * masses[row]);
+        self.clock.linearise += (middle - start).as_secs_f64();
+        self.clock.assemble += middle.elapsed().as_secs_f64();
+    }
+
+    /// Solves A dv = b; `dv` holds the prescribed values on entry.
+    pub(super) fn solve(
+        &mut self,
+        params: &IntegratorParams,
+        pins: &Prescribed<'_>,
+    ) -> Result<SolveInfo, SolveError> {
+        let start = Instant::now();
+        let info = self.solver.solve(&self.matrix, &self.b, pins.pinned, &mut self.dv, &params.solver);
+        self.clock.solve += start.elapsed().as_secs_f64();
+        info
+    }
+}
