@@ -104,6 +104,21 @@ impl Contact {
         }
     }
 
+    /// The vertices between which the contact acts, where it has fewer than four (the closest points lie on a side or
+    /// corner): several pairs of features that share it give the same contact.
+    pub(crate) fn shared_feature(&self) -> Option<[u32; 4]> {
+        let mut key = self.vertices;
+        let mut fewer = false;
+        for k in 0..4 {
+            if self.weights[k] == 0.0 {
+                key[k] = u32::MAX;
+                fewer = true;
+            }
+        }
+        key.sort_unstable();
+        fewer.then_some(key)
+    }
+
     /// Whether the impulse moves this one of the four vertices.
     pub(crate) fn moves(&self, k: usize) -> bool {
         self.share[k] != 0.0

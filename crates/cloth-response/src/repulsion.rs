@@ -1,9 +1,13 @@
 //! Pairs that are near at the start of the step: resting contact and elastic repulsion (3.34–3.36).
 //!
-//! With the distance δ at `x_t0` and the pair's rest gap g, the overlap is d = g − δ.
+//! With the gap (distance) δ at `x_t0` and the pair's rest gap g, the overlap is d = g − δ.
 //!
-//! - d < 0: the pair may approach by −d within the step and no further, v_n ≥ d/dt. Cloth lands at its rest gap.
-//! - d ≥ 0: it does not approach, v_n ≥ 0, and is pushed apart elastically by dt k_r d, at most until v_n = 0.1 d/dt.
+//! - d < 0: the gap may shrink to g within the step and no further. Cloth lands at its rest gap.
+//! - d ≥ 0: the gap does not shrink, and the pair is pushed apart elastically by dt k_r d, at most until the gap has
+//!   grown by 0.1 d.
+//!
+//! In velocities, with the gap linear about the candidate end of the step: v_n ≥ `least` and v_n ≤ `least` + 0.1 d/dt
+//! for the elastic part; for closest points that do not move, `least` is 0 or d/dt, as in 3.36.
 //!
 //! A pair with 0 ≤ d ≤ F/k_r under the pressing force F is at rest exactly: stopping it needs more than the spring gives.
 //! Deeper pairs move out by at most a tenth of d per step, so nothing bounces and nothing leaves the band. Pairs are
@@ -13,7 +17,9 @@
 //! and the edges between them, which add nothing but redundant contacts, stay idle; at a sharp edge the edges carry.
 
 use crate::impulse::{Contact, NormalLaw};
+use crate::motion::Motion;
 use crate::{ResponseParams, Vec3};
+use cloth_collision::distance::{edge_edge, vertex_triangle};
 use cloth_collision::{CollisionMesh, Stencil, StencilKind};
 
 /// Pairs up to this multiple of the thickness are looked at: falling from the rest gap by g dt² in one step
@@ -25,6 +31,8 @@ pub(crate) const EDGE_GAP: f64 = 0.75;
 const REST_FRACTION: f64 = 0.5;
 /// The fraction of the overlap that one step may undo (3.36).
 const PUSH_FRACTION: f64 = 0.1;
+/// Least cosine between the normals at the start and at the candidate end of one contact.
+const LEAST_AGREEMENT: f64 = 0.5;
 
 /// The pair's rest gap [m].
 ///
@@ -42,14 +50,47 @@ pub(crate) fn rest_gap(stencil: &Stencil, mesh: &CollisionMesh, thickness: f64, 
     }
 }
 
-/// The law of a pair at the distance `distance` with the rest gap `gap`.
-pub(crate) fn law(distance: f64, gap: f64, stiffness: f64, dt: f64) -> NormalLaw {
-    let overlap = gap - distance;
+/// The law of a pair that is `gap_t0` apart now and would be `gap_t1` apart after the step, at the normal velocity
+/// `v_n`; its rest gap is `gap`.
+fn law(gap_t0: f64, gap_t1: f64, v_n: f64, gap: f64, stiffness: f64, dt: f64) -> NormalLaw {
+    let overlap = gap - gap_t0;
+    // The end gap is gap_t1 + dt (v_n' - v_n).
+    let least = v_n + (gap.min(gap_t0) - gap_t1) / dt;
     if overlap < 0.0 {
-        NormalLaw { least: overlap / dt, spring: 0.0, cap: f64::NEG_INFINITY }
+        NormalLaw { least, spring: 0.0, cap: f64::NEG_INFINITY }
     } else {
-        NormalLaw { least: 0.0, spring: dt * stiffness * overlap, cap: PUSH_FRACTION * overlap / dt }
+        NormalLaw { least, spring: dt * stiffness * overlap, cap: least + PUSH_FRACTION * overlap / dt }
     }
+}
+
+/// The stencil with the closest points at the candidate end of the step.
+///
+/// Where a pair slides by more than a fraction of its gap, the closest points and the normal at the start would take
+/// the motion along the surface for an approach (a card could not slide over a vertex of the plane). `None` if the
+/// pair turns too far to be the same contact, or two edges no longer cross.
+fn at_end(stencil: &Stencil, x_t1: &[Vec3]) -> Option<Stencil> {
+    let p = stencil.vertices.map(|v| x_t1[v as usize]);
+    let weights = match stencil.kind {
+        StencilKind::VertexTriangle => {
+            let w = vertex_triangle::closest_point(&p);
+            [1.0, -w[0], -w[1], -w[2]]
+        }
+        StencilKind::EdgeEdge => {
+            let (s, t) = edge_edge::closest_points(&p);
+            if s <= 0.0 || s >= 1.0 || t <= 0.0 || t >= 1.0 {
+                return None;
+            }
+            [1.0 - s, s, t - 1.0, -t]
+        }
+    };
+    let r: Vec3 = (1..4).map(|k| (p[k] - p[0]) * weights[k]).sum();
+    let distance = r.norm();
+    (stencil.normal.dot(&r) > LEAST_AGREEMENT * distance).then(|| Stencil {
+        weights,
+        normal: r / distance,
+        distance,
+        ..*stencil
+    })
 }
 
 /// The contact of a near pair; `None` if it cannot act or all its vertices are prescribed.
@@ -58,13 +99,23 @@ pub(crate) fn contact(
     mesh: &CollisionMesh,
     params: &ResponseParams,
     rest_x: &[Vec3],
-    inv_mass: &[f64],
-    dt: f64,
+    motion: &Motion<'_>,
 ) -> Option<Contact> {
     let gap = rest_gap(stencil, mesh, params.thickness, rest_x);
-    if stencil.distance > BAND * gap {
+    let gap_t0 = stencil.distance;
+    if gap_t0 > BAND * gap {
         return None;
     }
+    let normal_velocity = |s: &Stencil| -> f64 {
+        let u: Vec3 = (0..4).map(|k| motion.buffers.velocity[s.vertices[k] as usize] * s.weights[k]).sum();
+        s.normal.dot(&u)
+    };
+    let dt = motion.dt;
+    let (stencil, gap_t1) = match at_end(stencil, &motion.buffers.end) {
+        Some(end) => (end, end.distance),
+        None => (*stencil, gap_t0 + dt * normal_velocity(stencil)),
+    };
+    let law = law(gap_t0, gap_t1, normal_velocity(&stencil), gap, params.repulsion_stiffness, dt);
     let friction = params.friction.coefficient(mesh, stencil.vertices[0], stencil.vertices[3]);
-    Contact::new(stencil, inv_mass, law(stencil.distance, gap, params.repulsion_stiffness, dt), friction)
+    Contact::new(&stencil, motion.inv_mass, law, friction)
 }

@@ -24,6 +24,8 @@ pub struct Responder {
     frames: Frames,
     zones: Zones,
     hits: Vec<Hit>,
+    /// Contacts on sides and corners that are in the set already.
+    shared: HashSet<[u32; 4]>,
 }
 
 impl Responder {
@@ -41,6 +43,7 @@ impl Responder {
             frames: Frames::default(),
             zones: Zones::default(),
             hits: Vec::new(),
+            shared: HashSet::new(),
         })
     }
 
@@ -116,7 +119,7 @@ impl Responder {
         v: &mut [Vec3],
         dt: f64,
     ) -> Result<ResponseInfo, ResponseError> {
-        let Self { params, rest_x, buffers, contacts, frames, zones, hits } = self;
+        let Self { params, rest_x, buffers, contacts, frames, zones, hits, shared } = self;
         let (mesh, count) = (detection.mesh, detection.mesh.vertex_count);
         check_input(count, inv_mass, x_t0, x_t1, v, dt)?;
         let mut info = ResponseInfo::default();
@@ -130,8 +133,11 @@ impl Responder {
         let near = detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, None, detection.pool)?;
         info.proximities = near.len();
         clock.lap(&mut info, "proximity");
+        shared.clear();
         for stencil in &near {
-            if let Some(contact) = repulsion::contact(stencil, mesh, params, rest_x, inv_mass, dt) {
+            if let Some(contact) = repulsion::contact(stencil, mesh, params, rest_x, motion)
+                && contact.shared_feature().is_none_or(|key| shared.insert(key))
+            {
                 contacts.push(contact);
             }
         }

@@ -73,7 +73,10 @@ impl Zones {
         }
         if first != NONE {
             for &v in vertices.iter().filter(|&&v| motion.prescribed(v)) {
-                if !self.ties.contains(&(first, v)) {
+                let root = self.root(first);
+                let known =
+                    (0..self.ties.len()).any(|i| self.ties[i].1 == v && self.root(self.ties[i].0) == root);
+                if !known {
                     self.ties.push((first, v));
                     grew = true;
                 }

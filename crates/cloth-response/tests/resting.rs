@@ -1,0 +1,87 @@
+//! Cloth on planes: landing, rest, friction on a slope.
+
+mod support;
+
+use cloth_response::collision::mesh::generators::grid;
+use cloth_response::{FrictionRule, ResponseParams, Vec3};
+use support::{World, cloth, collider, placed};
+
+/// [m]
+const THICKNESS: f64 = 0.004;
+/// [s]
+const DT: f64 = 0.005;
+/// Rounding of a fall of g dt = 0.05 m/s per step, taken back by a few dozen impulses [m/s].
+const REST_SPEED: f64 = 1e-12;
+/// The sliding speed is that of the closed form up to the sweeps' tolerance (1e-6 m/s of 0.1 m/s).
+const SLIDE_ERROR: f64 = 1e-4;
+
+fn params(friction: f64) -> ResponseParams {
+    ResponseParams {
+        thickness: THICKNESS,
+        friction: FrictionRule { default: friction, ..FrictionRule::default() },
+        ..ResponseParams::default()
+    }
+}
+
+/// A card of 10 × 10 cm at a height above a plane of 1 m, everything turned by `slope` about z.
+fn card_on_plane(height: f64, slope: f64, params: ResponseParams) -> World {
+    let turn = [0.0, 0.0, slope];
+    let card = placed(grid(0.1, 0.1, 6, 6).unwrap(), [0.0; 3], [0.0, height, 0.0]);
+    let plane = placed(grid(1.0, 1.0, 5, 5).unwrap(), [0.0; 3], [0.013, 0.0, 0.017]);
+    World::new(&[cloth(placed(card, turn, [0.0; 3])), collider(placed(plane, turn, [0.0; 3]))], params)
+}
+
+/// The card laid at its rest gap.
+fn card_at_rest(slope: f64, friction: f64) -> World {
+    card_on_plane(THICKNESS, slope, params(friction))
+}
+
+fn speed(world: &World) -> f64 {
+    world.body(0).map(|i| world.v[i].norm()).fold(0.0, f64::max)
+}
+
+/// Mean velocity of the card [m/s].
+fn mean_velocity(world: &World) -> Vec3 {
+    world.momentum().0 / world.body(0).map(|i| 1.0 / world.inv_mass[i]).sum::<f64>()
+}
+
+/// A falling card lands at its rest gap and comes to rest without jitter.
+#[test]
+fn card_comes_to_rest() {
+    let mut world = card_on_plane(0.05, 0.0, params(0.3));
+    for _ in 0..100 {
+        world.step(DT);
+    }
+    for _ in 0..200 {
+        let info = world.step(DT);
+        assert!(speed(&world) < REST_SPEED, "{}", speed(&world));
+        assert_eq!((info.collisions, info.zones, info.held_vertices), (0, 0, 0));
+    }
+    let heights = world.body(0).map(|i| world.x[i].y);
+    assert!(heights.clone().fold(1.0, f64::min) > 0.95 * THICKNESS);
+    assert!(heights.fold(0.0, f64::max) < 1.05 * THICKNESS);
+}
+
+/// Below the friction angle the card stays, above it it slides with g (sin θ − μ cos θ) exactly.
+#[test]
+fn card_on_slope_sticks_or_slides() {
+    for (slope, friction) in [(0.2_f64, 0.3_f64), (0.28, 0.3), (0.6, 0.8), (0.4, 0.3), (0.6, 0.1), (0.3, 0.0)]
+    {
+        let mut world = card_at_rest(slope, friction);
+        let start = world.x.clone();
+        let steps = 60;
+        for _ in 0..steps {
+            world.step(DT);
+        }
+        let expected = 9.81 * (slope.sin() - friction * slope.cos()).max(0.0) * DT * steps as f64;
+        let down = Vec3::new(-slope.cos(), -slope.sin(), 0.0);
+        let got = mean_velocity(&world).dot(&down);
+        if expected == 0.0 {
+            let drift = world.body(0).map(|i| (world.x[i] - start[i]).norm()).fold(0.0, f64::max);
+            assert!(drift < 1e-9, "slope {slope}, friction {friction}: drift {drift:e} m");
+        } else {
+            let error = (got - expected).abs() / expected;
+            assert!(error < SLIDE_ERROR, "slope {slope}, friction {friction}: {got} against {expected} m/s");
+        }
+    }
+}
