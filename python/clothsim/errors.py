@@ -64,6 +64,8 @@ class InvalidScene(ClothSimError, ValueError):
         What it should be.
     got : str
         What came.
+    nearest : str or None
+        The nearest known name, where a name was not known.
     """
 
     def __init__(
@@ -75,8 +77,10 @@ class InvalidScene(ClothSimError, ValueError):
         key: str = "",
         expected: str = "",
         got: str = "",
+        nearest: str | None = None,
     ) -> None:
         super().__init__(message)
+        self.nearest = nearest
         self.file = file
         self.line = line
         self.key = key
@@ -91,7 +95,8 @@ class MeshError(ClothSimError, ValueError):
     ----------
     kind : str
         ``"not-finite"``, ``"index-out-of-range"``, ``"zero-area"``, ``"non-manifold-edge"``, ``"unreferenced"``,
-        ``"uv-length"``, ``"parameter"``, ``"empty"`` or ``"file"``.
+        ``"duplicate-triangle"``, ``"degenerate"``, ``"uv-length"``, ``"uv-not-finite"``, ``"zero-area-uv"``,
+        ``"parameter"``, ``"empty"`` or ``"file"``.
     vertices : tuple of int
         The vertices concerned: the bad one, the triangle's three, the edge's two.
     triangles : tuple of int
@@ -169,17 +174,17 @@ class SimulationStuck(ClothSimError):
 
 
 class SolverFailed(ClothSimError):
-    """A linear or nonlinear solve broke down.
+    """A stage of a step broke down for a reason that is not the scene's.
 
     Attributes
     ----------
-    time : float
-        Start of the step that failed [s].
+    stage : str
+        The stage.
     """
 
-    def __init__(self, message: str, *, time: float = 0.0) -> None:
+    def __init__(self, message: str, *, stage: str = "") -> None:
         super().__init__(message)
-        self.time = time
+        self.stage = stage
 
 
 class CheckpointError(ClothSimError, ValueError):

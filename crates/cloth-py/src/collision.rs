@@ -72,7 +72,7 @@ pub(crate) fn detect<'py>(
 fn stats_to_dict<'py>(py: Python<'py>, stats: &DetectStats) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("broad_phase_tests", stats.broad_phase_tests)?;
-    dict.set_item("triangle_pairs", stats.triangle_pairs)?;
+    dict.set_item("leaf_pairs", stats.leaf_pairs)?;
     dict.set_item("candidates_vertex_triangle", stats.candidates_vertex_triangle)?;
     dict.set_item("candidates_edge_edge", stats.candidates_edge_edge)?;
     dict.set_item("root_searches", stats.root_searches)?;

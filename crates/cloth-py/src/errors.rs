@@ -5,7 +5,9 @@
 //! `ValueError`.
 
 use cloth_sim::collision::DetectError;
+use cloth_sim::core::CoreError;
 use cloth_sim::core::mesh::MeshError;
+use cloth_sim::{SceneError, SimError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -90,5 +92,74 @@ pub(crate) fn detect_error(py: Python<'_>, error: &DetectError) -> PyErr {
                 attributes.set_item("name", message.split(':').next())
             })
         }
+    }
+}
+
+/// A material or an array that the forces refuse.
+pub(crate) fn core_error(py: Python<'_>, error: &CoreError) -> PyErr {
+    match error {
+        CoreError::Parameter { name, expected, got } => invalid_input(py, name, expected, &got.to_string()),
+        CoreError::UnknownMaterial { got, known } => {
+            invalid_input(py, "material", &format!("one of {known:?}"), &format!("\"{got}\""))
+        }
+        CoreError::Length { name, expected, got } => {
+            invalid_input(py, name, &format!("length {expected}"), &got.to_string())
+        }
+        CoreError::Degenerate { vertices, element, .. } => {
+            exception(py, "MeshError", &error.to_string(), |attributes| {
+                attributes.set_item("kind", "degenerate")?;
+                attributes.set_item("vertices", vertices)?;
+                attributes.set_item("triangles", [*element])
+            })
+        }
+        CoreError::Mesh(inner) => mesh_error(py, inner),
+        CoreError::Massless { vertex } => exception(py, "MeshError", &error.to_string(), |attributes| {
+            attributes.set_item("kind", "unreferenced")?;
+            attributes.set_item("vertices", [*vertex])
+        }),
+    }
+}
+
+/// `InvalidScene` with file, line and key.
+pub(crate) fn scene_error(py: Python<'_>, error: &SceneError) -> PyErr {
+    exception(py, "InvalidScene", &error.to_string(), |attributes| {
+        attributes.set_item("file", &error.file)?;
+        attributes.set_item("line", error.line)?;
+        attributes.set_item("key", &error.key)?;
+        attributes.set_item("expected", &error.expected)?;
+        attributes.set_item("got", &error.got)?;
+        attributes.set_item("nearest", &error.nearest)
+    })
+}
+
+/// What a simulation raises; after `SimulationDiverged` and `SimulationStuck` it holds the last good state.
+pub(crate) fn sim_error(py: Python<'_>, error: &SimError) -> PyErr {
+    let message = error.to_string();
+    match error {
+        SimError::InvalidScene(inner) => scene_error(py, inner),
+        SimError::StartIntersections { count, pairs, .. } => {
+            exception(py, "IntersectingStart", &message, |attributes| {
+                attributes.set_item("count", *count)?;
+                attributes.set_item("pairs", pairs.iter().map(|&[a, b]| (a, b)).collect::<Vec<_>>())
+            })
+        }
+        SimError::Diverged { time, vertices, .. } => {
+            exception(py, "SimulationDiverged", &message, |attributes| {
+                attributes.set_item("time", *time)?;
+                attributes.set_item("vertices", vertices)
+            })
+        }
+        SimError::Stuck { time, pairs, vertices } => {
+            exception(py, "SimulationStuck", &message, |attributes| {
+                attributes.set_item("time", *time)?;
+                attributes.set_item("vertices", vertices)?;
+                attributes.set_item("count", pairs.len())
+            })
+        }
+        SimError::InvalidCheckpoint { .. } => exception(py, "CheckpointError", &message, |_| Ok(())),
+        SimError::InvalidArgument { name, expected, got } => invalid_input(py, name, expected, got),
+        SimError::Stage { stage, .. } => exception(py, "SolverFailed", &message, |attributes| {
+            attributes.set_item("stage", *stage)
+        }),
     }
 }

@@ -7,6 +7,8 @@ mod convert;
 mod detach;
 mod errors;
 mod mesh;
+mod scene;
+mod simulation;
 
 use pyo3::prelude::*;
 
@@ -30,5 +32,13 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(collision::vertex_triangle_ccd, module)?)?;
     module.add_function(wrap_pyfunction!(collision::edge_edge_ccd, module)?)?;
     module.add_function(wrap_pyfunction!(collision::self_intersections, module)?)?;
+
+    module.add_class::<scene::PyScene>()?;
+    module.add_function(wrap_pyfunction!(scene::scene_schema, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::material_names, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::material_named, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::check_material, module)?)?;
+
+    module.add_class::<simulation::PySimulation>()?;
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! Mesh checks and generators: arrays in, arrays out.
 
-use cloth_sim::core::mesh::{MeshError, TriMesh, generators};
+use cloth_sim::core::mesh::{MeshError, TriMesh, Vec3, generators};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::convert::{corner_uv_from, indices_to_numpy, points_to_numpy, triangle
 use crate::errors::mesh_error;
 
 /// `(vertices (n, 3), triangles (m, 3), uv (m, 3, 2) or None)`.
-type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, Option<Bound<'py, PyArray3<f64>>>);
+pub(crate) type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, Option<Bound<'py, PyArray3<f64>>>);
 
 /// The engine's mesh from arrays; UV per triangle corner.
 ///
@@ -26,14 +26,18 @@ pub(crate) fn mesh_from(
 }
 
 /// The arrays of a mesh.
-pub(crate) fn mesh_to_numpy(py: Python<'_>, mesh: TriMesh) -> PyResult<Arrays<'_>> {
-    let TriMesh { vertices, triangles, uv } = mesh;
+pub(crate) fn mesh_to_numpy<'py>(
+    py: Python<'py>,
+    vertices: &[Vec3],
+    triangles: Vec<[u32; 3]>,
+    uv: Option<Vec<[[f64; 2]; 3]>>,
+) -> PyResult<Arrays<'py>> {
     let count = triangles.len();
     let uv = uv.map(|uv| {
         let flat: Vec<f64> = uv.into_iter().flatten().flatten().collect();
         flat.into_pyarray(py).reshape([count, 3, 2])
     });
-    Ok((points_to_numpy(py, &vertices), indices_to_numpy(py, triangles.into_iter()), uv.transpose()?))
+    Ok((points_to_numpy(py, vertices), indices_to_numpy(py, triangles.into_iter()), uv.transpose()?))
 }
 
 /// Refuses what no scene can use, naming the element.
@@ -49,7 +53,8 @@ pub(crate) fn check_mesh(
 }
 
 fn made<'py>(py: Python<'py>, mesh: Result<TriMesh, MeshError>) -> PyResult<Arrays<'py>> {
-    mesh_to_numpy(py, mesh.map_err(|error| mesh_error(py, &error))?)
+    let TriMesh { vertices, triangles, uv } = mesh.map_err(|error| mesh_error(py, &error))?;
+    mesh_to_numpy(py, &vertices, triangles, uv)
 }
 
 /// A rectangle in the xz-plane.

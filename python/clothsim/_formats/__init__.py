@@ -8,7 +8,7 @@ from typing import NamedTuple
 from clothsim._arrays import Floats, Ints
 from clothsim.errors import MeshError
 
-__all__ = ["READABLE", "WRITABLE", "RawMesh", "read", "write"]
+__all__ = ["READABLE", "WRITABLE", "RawMesh", "parse", "read", "write"]
 
 READABLE = (".obj", ".ply", ".stl", ".gltf", ".glb")
 WRITABLE = (".obj", ".ply")
@@ -33,6 +33,12 @@ def read(path: Path) -> RawMesh:
     except OSError as error:
         reason = error.strerror or str(error)
         raise MeshError(f"{path}: cannot read the mesh: {reason}", kind="file") from error
+    return parse(content, path)
+
+
+def parse(content: bytes, path: Path) -> RawMesh:
+    """Parse the bytes of a file with the suffix of ``path``."""
+    suffix = path.suffix.lower()
     if suffix == ".obj":
         from clothsim._formats import obj
 

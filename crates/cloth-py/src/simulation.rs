@@ -1,0 +1,238 @@
+//! A simulation as a frozen class over a lock: threads may share it, and each call has it alone.
+//!
+//! The lock is taken after the interpreter is released, so that a thread that waits for it holds nobody up.
+
+use std::ops::ControlFlow;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use cloth_sim::{Advance, Assets, BodyKind, Sequence, SimError, Simulation, SimulationOptions};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use serde::Serialize;
+
+use crate::convert::{frames_from, points_to_numpy, triangles_from, vertices_from};
+use crate::errors::{invalid_input, sim_error};
+use crate::mesh::{Arrays, mesh_from, mesh_to_numpy};
+use crate::scene::PyScene;
+
+/// Name, kind, vertex range in the global array, and the mesh's triangles and UV (with no vertices).
+type BodyTuple<'py> = (String, &'static str, (usize, usize), Arrays<'py>);
+
+/// A scene being simulated.
+#[pyclass(frozen, module = "clothsim._core", name = "Simulation")]
+pub(crate) struct PySimulation {
+    simulation: Mutex<Simulation>,
+}
+
+#[pymethods]
+impl PySimulation {
+    #[new]
+    #[pyo3(signature = (scene, meshes, sequences, velocities, threads, allow_intersections))]
+    fn new(
+        py: Python<'_>,
+        scene: &Bound<'_, PyScene>,
+        meshes: &Bound<'_, PyDict>,
+        sequences: &Bound<'_, PyDict>,
+        velocities: &Bound<'_, PyDict>,
+        threads: Option<usize>,
+        allow_intersections: bool,
+    ) -> PyResult<Self> {
+        let mut assets = Assets::default();
+        for (name, arrays) in meshes {
+            let (vertices, triangles, uv): (Bound<'_, PyAny>, Bound<'_, PyAny>, Option<Bound<'_, PyAny>>) =
+                arrays.extract()?;
+            assets.meshes.insert(name.extract()?, mesh_from(&vertices, &triangles, uv.as_ref())?);
+        }
+        for (name, arrays) in sequences {
+            let (frames, triangles): (Bound<'_, PyAny>, Bound<'_, PyAny>) = arrays.extract()?;
+            let frames = frames_from(&frames, "positions")?;
+            let vertex_count = frames.first().map_or(0, Vec::len);
+            let triangles = triangles_from(&triangles, "triangles", vertex_count)?;
+            assets.sequences.insert(name.extract()?, Sequence { triangles, frames });
+        }
+        for (name, array) in velocities {
+            assets.velocities.insert(name.extract()?, vertices_from(&array, "velocities")?);
+        }
+        let options = SimulationOptions { threads, allow_intersections };
+        let scene = &scene.get().scene;
+        let simulation = py
+            .detach(|| Simulation::new(scene, assets, options).map_err(Box::new))
+            .map_err(|error| sim_error(py, &error))?;
+        Ok(Self { simulation: Mutex::new(simulation) })
+    }
+
+    /// The simulation that a checkpoint holds.
+    #[staticmethod]
+    #[pyo3(signature = (bytes, threads))]
+    fn resume(py: Python<'_>, bytes: &[u8], threads: Option<usize>) -> PyResult<Self> {
+        let simulation = py
+            .detach(|| Simulation::resume(bytes, threads).map_err(Box::new))
+            .map_err(|error| sim_error(py, &error))?;
+        Ok(Self { simulation: Mutex::new(simulation) })
+    }
+
+    /// Take one step of the scene's size.
+    fn step(&self, py: Python<'_>) -> PyResult<()> {
+        self.detached(py, |simulation| simulation.step())
+    }
+
+    /// Advance in equal steps; Ctrl-C is looked for before each. Returns the number of steps.
+    fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<usize> {
+        self.interruptible(py, |simulation, check| simulation.advance(seconds, check))
+    }
+
+    /// Do what an interrupted `advance` has left.
+    fn finish_advance(&self, py: Python<'_>) -> PyResult<usize> {
+        self.interruptible(py, Simulation::finish_advance)
+    }
+
+    /// Whether an interrupted `advance` has something left.
+    #[getter]
+    fn interrupted(&self, py: Python<'_>) -> bool {
+        self.read(py, Simulation::is_interrupted)
+    }
+
+    /// Simulated time [s].
+    #[getter]
+    fn time(&self, py: Python<'_>) -> f64 {
+        self.read(py, Simulation::time)
+    }
+
+    /// Steps taken since the start.
+    #[getter]
+    fn step_count(&self, py: Python<'_>) -> u64 {
+        self.read(py, Simulation::step_count)
+    }
+
+    /// Positions of all cloth vertices [m], (n, 3); a copy.
+    fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let points = self.read(py, |simulation| simulation.positions().to_vec());
+        points_to_numpy(py, &points)
+    }
+
+    /// Velocities of all cloth vertices [m/s], (n, 3); a copy.
+    fn velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let points = self.read(py, |simulation| simulation.velocities().to_vec());
+        points_to_numpy(py, &points)
+    }
+
+    /// Positions of all collider vertices [m], (n, 3); a copy.
+    fn collider_positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let points = self.read(py, |simulation| simulation.collider_positions().to_vec());
+        points_to_numpy(py, &points)
+    }
+
+    /// Lumped mass of each cloth vertex [kg], (n,); a copy.
+    fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.read(py, |simulation| simulation.masses().to_vec()).into_pyarray(py)
+    }
+
+    /// The bodies, cloth first: name, kind, range of vertices, and their mesh without vertices.
+    fn bodies<'py>(&self, py: Python<'py>) -> PyResult<Vec<BodyTuple<'py>>> {
+        let bodies = self.read(py, |simulation| simulation.bodies().to_vec());
+        bodies
+            .into_iter()
+            .map(|body| {
+                let kind = match body.kind {
+                    BodyKind::Cloth => "cloth",
+                    BodyKind::Collider => "collider",
+                };
+                let arrays = mesh_to_numpy(py, &[], body.triangles, body.uv)?;
+                Ok((body.name, kind, (body.vertices.start, body.vertices.end), arrays))
+            })
+            .collect()
+    }
+
+    /// Mechanical energy of the cloth by kind [J], as JSON.
+    fn energy(&self, py: Python<'_>) -> PyResult<String> {
+        let energy = self.read(py, Simulation::energy);
+        json(py, &energy)
+    }
+
+    /// The plan as JSON and as a table for people.
+    fn plan(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        let plan = self.read(py, |simulation| simulation.plan().clone());
+        Ok((json(py, &plan)?, plan.to_string()))
+    }
+
+    /// Totals, effects and threads of the report, without its steps, as JSON.
+    fn summary(&self, py: Python<'_>) -> PyResult<String> {
+        let (totals, effects, threads) = self.read(py, |simulation| {
+            let report = simulation.report();
+            (report.totals.clone(), report.effects.clone(), report.threads)
+        });
+        json(py, &serde_json::json!({ "totals": totals, "effects": effects, "threads": threads }))
+    }
+
+    /// The reports of the steps from number `first` (from 0) on, as JSON.
+    fn steps(&self, py: Python<'_>, first: usize) -> PyResult<String> {
+        let steps = self.read(py, |simulation| {
+            let steps = &simulation.report().steps;
+            steps[first.min(steps.len())..].to_vec()
+        });
+        json(py, &steps)
+    }
+
+    /// The scene as JSON, defaults written out.
+    fn scene(&self, py: Python<'_>) -> PyResult<String> {
+        let scene = self.read(py, |simulation| simulation.scene().clone());
+        json(py, &scene)
+    }
+
+    /// Pairs of triangles that pass through each other now, (k, 2).
+    fn intersections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
+        let pairs = self.detached(py, |simulation| simulation.intersections())?;
+        Ok(crate::convert::indices_to_numpy(py, pairs.into_iter()))
+    }
+
+    /// Everything, as bytes.
+    fn checkpoint<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        let bytes = self.read(py, Simulation::checkpoint);
+        PyBytes::new(py, &bytes)
+    }
+}
+
+impl PySimulation {
+    fn lock(&self) -> MutexGuard<'_, Simulation> {
+        self.simulation.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn read<T: Send>(&self, py: Python<'_>, look: impl FnOnce(&Simulation) -> T + Send) -> T {
+        py.detach(|| look(&self.lock()))
+    }
+
+    fn detached<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Simulation) -> Result<T, SimError> + Send,
+    ) -> PyResult<T> {
+        py.detach(|| work(&mut self.lock()).map_err(Box::new)).map_err(|error| sim_error(py, &error))
+    }
+
+    /// Runs an advance that can be stopped between steps by a Python signal handler that raises.
+    fn interruptible(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Simulation, &mut dyn FnMut() -> ControlFlow<()>) -> Result<Advance, SimError> + Send,
+    ) -> PyResult<usize> {
+        let mut raised: Option<PyErr> = None;
+        let mut check = || match Python::attach(|py| py.check_signals()) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(error) => {
+                raised = Some(error);
+                ControlFlow::Break(())
+            }
+        };
+        let advance = self.detached(py, |simulation| work(simulation, &mut check))?;
+        match raised {
+            Some(error) => Err(error),
+            None => Ok(advance.steps),
+        }
+    }
+}
+
+fn json(py: Python<'_>, value: &impl Serialize) -> PyResult<String> {
+    serde_json::to_string(value)
+        .map_err(|error| invalid_input(py, "report", "values that JSON can hold", &error.to_string()))
+}

@@ -1,0 +1,328 @@
+"""Frames of a run: meshes of fixed topology over time, in memory or in a file that grows."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clothsim._arrays import Floats, Ints
+from clothsim._files import output_error, whole
+from clothsim.errors import InvalidInput
+
+__all__ = ["Body", "FrameWriter", "Recording"]
+
+_FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """One mesh of a recording.
+
+    Attributes
+    ----------
+    name : str
+        As in the scene.
+    kind : {"cloth", "collider"}
+        Whether it moves by forces.
+    vertex_count : int
+        Number of vertices.
+    triangles : (m, 3) int64
+        Indices of this body's own vertices.
+    uv : (m, 3, 2) float64 or None
+        Material coordinates per corner [m].
+    static : bool
+        It stands still: its positions are the same in all frames.
+    """
+
+    name: str
+    kind: Literal["cloth", "collider"]
+    vertex_count: int
+    triangles: Ints
+    uv: Floats | None = None
+    static: bool = False
+
+
+class Recording:
+    """Positions of every body at every frame.
+
+    Parameters
+    ----------
+    bodies : sequence of Body
+        The meshes, cloth first.
+    times : (frames,) float64
+        Time of each frame [s].
+    moving : (frames, n, 3) float64
+        Positions [m] of the bodies that are not static, one after the other in the order of ``bodies``.
+    standing : (k, 3) float64
+        Positions [m] of the static bodies, likewise.
+    fps : float
+        Frames per second.
+    up : {"y", "z"}
+        The axis that points up.
+    name : str
+        The scene's name.
+
+    Examples
+    --------
+    >>> import numpy as np, clothsim as cs
+    >>> triangle = cs.Body("sail", "cloth", 3, np.array([[0, 1, 2]]))
+    >>> frames = cs.Recording([triangle], np.arange(2) / 60, np.zeros((2, 3, 3)))
+    >>> frames.positions("sail", 1).shape
+    (3, 3)
+    """
+
+    def __init__(
+        self,
+        bodies: Sequence[Body],
+        times: Floats,
+        moving: Floats,
+        standing: Floats | None = None,
+        *,
+        fps: float = 60.0,
+        up: str = "y",
+        name: str = "",
+    ) -> None:
+        self.bodies = tuple(bodies)
+        self.times = np.asarray(times, dtype=np.float64)
+        self.fps = float(fps)
+        self.up = up
+        self.name = name
+        self._moving = moving
+        self._standing = np.zeros((0, 3)) if standing is None else standing
+        self._slices = _slices(self.bodies)
+        expected = (len(self.times), sum(b.vertex_count for b in self.bodies if not b.static), 3)
+        if moving.shape != expected:
+            raise InvalidInput(f"moving: expected shape {expected}, got shape {moving.shape}", name="moving")
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __repr__(self) -> str:
+        span = f", {self.times[0]:g} s to {self.times[-1]:g} s" if len(self) else ""
+        return f"Recording({len(self)} frames of {', '.join(b.name for b in self.bodies)}{span})"
+
+    def body(self, name: str) -> Body:
+        """Return the body of that name."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        known = ", ".join(repr(b.name) for b in self.bodies)
+        raise InvalidInput(f"body: expected one of {known}, got {name!r}", name="body")
+
+    def positions(self, body: Body | str, frame: int) -> Floats:
+        """Positions [m] of a body in a frame, shape (n, 3); a copy."""
+        found = self.body(body) if isinstance(body, str) else body
+        where = self._slices[found.name]
+        return np.array(self._standing[where] if found.static else self._moving[frame][where])
+
+    @property
+    def cloth(self) -> tuple[Body, ...]:
+        """The bodies that move by forces."""
+        return tuple(b for b in self.bodies if b.kind == "cloth")
+
+    # Files -----------------------------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write everything to one ``.npz``, whole or not at all; equal recordings give equal bytes.
+
+        ``positions`` (frames, n, 3), ``triangles`` (m, 3) and ``uv`` (m, 3, 2; NaN where a cloth has none) hold all cloths
+        joined; ``times`` (frames,); ``collider_0_positions`` (frames or 1 if static, n, 3) and
+        ``collider_0_triangles`` each collider; ``meta`` a JSON text with names, ranges, fps and the up axis.
+        """
+        with whole(Path(path)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+            for name, shape, rows in self._members():
+                _write_member(archive, name, shape, rows)
+
+    def _members(self) -> Iterator[tuple[str, NDArray[Any] | tuple[int, ...], Iterable[Floats]]]:
+        cloth = self.cloth
+        count = sum(b.vertex_count for b in cloth)
+        firsts = np.cumsum([0, *(b.vertex_count for b in cloth)]).tolist()
+        yield "times", self.times, ()
+        yield "positions", (len(self), count, 3), (self._moving[f][:count] for f in range(len(self)))
+        triangles = [b.triangles + first for b, first in zip(cloth, firsts, strict=False)]
+        yield "triangles", np.concatenate([np.zeros((0, 3), np.int64), *triangles]), ()
+        if any(b.uv is not None for b in cloth):
+            uv = [np.full((len(b.triangles), 3, 2), np.nan) if b.uv is None else b.uv for b in cloth]
+            yield "uv", np.concatenate(uv), ()
+        for index, body in enumerate(b for b in self.bodies if b.kind == "collider"):
+            where = self._slices[body.name]
+            if body.static:
+                yield f"collider_{index}_positions", self._standing[where][None], ()
+            else:
+                shape = (len(self), body.vertex_count, 3)
+                rows = (self._moving[f][where] for f in range(len(self)))
+                yield f"collider_{index}_positions", shape, rows
+            yield f"collider_{index}_triangles", body.triangles, ()
+        meta = {
+            "format": _FORMAT, "name": self.name, "fps": self.fps, "up": self.up, "units": "m, s",
+            "bodies": [
+                {"name": b.name, "kind": b.kind, "vertex_count": b.vertex_count, "static": b.static,
+                 "triangle_count": len(b.triangles), "uv": b.uv is not None}
+                for b in self.bodies
+            ],
+        }  # fmt: skip
+        yield "meta", np.array(json.dumps(meta)), ()
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Recording:
+        """Read what `save` wrote."""
+        with np.load(path, allow_pickle=False) as data:
+            meta = json.loads(str(data["meta"]))
+            bodies: list[Body] = []
+            moving, standing = [data["positions"]], [np.zeros((0, 3))]
+            first_vertex = first_triangle = collider = 0
+            for entry in meta["bodies"]:
+                n, m = entry["vertex_count"], entry["triangle_count"]
+                if entry["kind"] == "cloth":
+                    rows = slice(first_triangle, first_triangle + m)
+                    uv = data["uv"][rows] if entry["uv"] else None
+                    bodies.append(Body(entry["name"], "cloth", n, data["triangles"][rows] - first_vertex, uv))
+                    first_vertex += n
+                    first_triangle += m
+                    continue
+                triangles = data[f"collider_{collider}_triangles"]
+                positions = data[f"collider_{collider}_positions"]
+                collider += 1
+                bodies.append(Body(entry["name"], "collider", n, triangles, None, entry["static"]))
+                if entry["static"]:
+                    standing.append(positions[0])
+                else:
+                    moving.append(positions)
+            return cls(
+                bodies, data["times"], np.concatenate(moving, axis=1), np.concatenate(standing),
+                fps=meta["fps"], up=meta["up"], name=meta["name"],
+            )  # fmt: skip
+
+    def save_usd(self, path: str | os.PathLike[str]) -> None:
+        """Write a USD stage (``.usdc``, ``.usda``, ``.usd``): time-sampled meshes. Needs usd-core."""
+        from clothsim._export import usd
+
+        usd.write(self, Path(path))
+
+    def save_sequence(self, folder: str | os.PathLike[str], suffix: str = "obj") -> None:
+        """Write one mesh file per frame and body into a new folder: ``<body>_0000.obj`` or ``.ply``."""
+        from clothsim._export import sequence
+
+        sequence.write(self, Path(folder), suffix)
+
+    def film_strip(self, path: str | os.PathLike[str], *, moments: int = 8) -> None:
+        """Render that many moments side by side into a PNG. Needs PyVista."""
+        from clothsim._export import film_strip
+
+        film_strip.write(self, Path(path), moments=moments)
+
+
+def _slices(bodies: Sequence[Body]) -> dict[str, slice]:
+    """Where each body lies in the array of the moving or of the static ones."""
+    at = {True: 0, False: 0}
+    out: dict[str, slice] = {}
+    for body in bodies:
+        out[body.name] = slice(at[body.static], at[body.static] + body.vertex_count)
+        at[body.static] += body.vertex_count
+    return out
+
+
+def _write_member(
+    archive: zipfile.ZipFile, name: str, array: NDArray[Any] | tuple[int, ...], rows: Iterable[Floats]
+) -> None:
+    """One array of an ``.npz``, as numpy writes it; where a shape is given, its rows are streamed."""
+    info = zipfile.ZipInfo(f"{name}.npy")  # dated 1980: the same bytes at any time
+    with archive.open(info, "w", force_zip64=True) as member:
+        if isinstance(array, np.ndarray):
+            buffer = io.BytesIO()
+            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+            member.write(buffer.getvalue())
+            return
+        header = {"descr": "<f8", "fortran_order": False, "shape": array}
+        np.lib.format.write_array_header_1_0(member, header)
+        for row in rows:
+            member.write(np.ascontiguousarray(row, dtype="<f8").tobytes())
+
+
+class FrameWriter:
+    """An append-only file of frames: rows of float64, one per frame, and one JSON line per frame beside it.
+
+    Rows that a crash left behind a checkpoint are cut off by ``keep``.
+    """
+
+    def __init__(self, folder: Path, vertex_count: int, *, keep: int = 0) -> None:
+        self._rows_path = folder / "frames.bin"
+        self._lines_path = folder / "frames.jsonl"
+        self._stride = vertex_count * 24
+        self._count = vertex_count
+        self.frames = keep
+        self._rows = self._rows_path.open("r+b" if self._rows_path.exists() else "w+b")
+        self._lines = self._lines_path.open("r+b" if self._lines_path.exists() else "w+b")
+        self._cut(keep)
+
+    def _cut(self, keep: int) -> None:
+        lines = self._lines.read().split(b"\n")[:keep]
+        size = os.fstat(self._rows.fileno()).st_size
+        if len(lines) < keep or size < keep * self._stride:
+            raise InvalidInput(
+                f"{self._rows_path.parent}: expected {keep} frames as the checkpoint says, got fewer", name="OUT"
+            )
+        self._rows.truncate(keep * self._stride)
+        self._rows.seek(keep * self._stride)
+        text = b"".join(line + b"\n" for line in lines)
+        self._lines.truncate(len(text))
+        self._lines.seek(len(text))
+
+    def append(self, positions: Floats, facts: dict[str, Any]) -> None:
+        """Add a frame: positions (n, 3) of the moving bodies [m] and what is to be known about it."""
+        try:
+            self._rows.write(np.ascontiguousarray(positions, dtype="<f8").tobytes())
+            self._lines.write(json.dumps(facts).encode() + b"\n")
+        except OSError as error:
+            raise output_error(self._rows_path, error) from error
+        self.frames += 1
+
+    def sync(self) -> None:
+        """Make sure that the frames are on the disk."""
+        for file in (self._rows, self._lines):
+            try:
+                file.flush()
+                os.fsync(file.fileno())
+            except OSError as error:
+                raise output_error(self._rows_path, error) from error
+
+    def close(self) -> None:
+        """Close the files, keeping what could be written."""
+        for file in (self._rows, self._lines):
+            _close(file)
+
+    def facts(self) -> list[dict[str, Any]]:
+        """What `append` was told about each frame."""
+        with self._lines_path.open("rb") as file:
+            return [json.loads(line) for line in file.read().splitlines()[: self.frames]]
+
+    def rows(self) -> Floats:
+        """All frames (frames, n, 3), mapped from the file, read-only."""
+        if self.frames == 0 or self._count == 0:
+            return np.zeros((self.frames, self._count, 3))
+        return np.memmap(self._rows_path, dtype="<f8", mode="r", shape=(self.frames, self._count, 3))
+
+
+def _close(file: IO[bytes]) -> None:
+    try:
+        file.close()
+    except OSError:
+        # The disk is full and the buffer cannot be written: the frames since the last checkpoint are lost anyway.
+        return
+
+
+def body_facts(body: Body) -> dict[str, Any]:
+    """Names and sizes of a body, for a report."""
+    facts = asdict(body)
+    facts["triangle_count"] = len(facts.pop("triangles"))
+    facts.pop("uv")
+    return facts

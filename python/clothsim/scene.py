@@ -1,0 +1,365 @@
+"""Scenes: what there is, how it moves, how it is stepped and what is written."""
+
+from __future__ import annotations
+
+import copy
+import io
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from clothsim import _core, _formats
+from clothsim._arrays import Floats, Ints, floats, indices
+from clothsim._export.names import file_stem
+from clothsim._files import write_whole
+from clothsim._formats import RawMesh
+from clothsim._plain import plain
+from clothsim.errors import InvalidInput, InvalidScene, MeshError
+from clothsim.material import Material
+from clothsim.mesh import Mesh
+
+__all__ = ["Animation", "Scene"]
+
+
+class Animation:
+    """An animated mesh of fixed topology: vertices per frame, linear in between.
+
+    Parameters
+    ----------
+    positions : (frames, n, 3) array of float64
+        Vertex positions [m].
+    triangles : (m, 3) array of int32 or int64
+        Vertex indices.
+    fps : float
+        Frames per second.
+    """
+
+    def __init__(self, positions: ArrayLike, triangles: ArrayLike, fps: float) -> None:
+        self.positions: Floats = floats(positions, "positions", "shape (frames, n, 3)")
+        self.triangles: Ints = indices(triangles, "triangles")
+        self.fps = float(fps)
+        if self.positions.ndim != 3 or self.positions.shape[2] != 3:
+            expected, got = "shape (frames, n, 3)", f"shape {self.positions.shape}"
+            raise InvalidInput(f"positions: expected {expected}, got {got}", name="positions", expected=expected, got=got)
+
+
+class Scene:
+    """A scene. Keys and units are those of scene files: ``clothsim schema`` prints them all.
+
+    Bodies may be given here as tables, or added with `add_cloth` and `add_collider`. In a table ``mesh`` may be a
+    `Mesh`, ``material`` a `Material`, ``velocities`` an array (n, 3) [m/s] and ``sequence`` an `Animation`.
+
+    Parameters
+    ----------
+    name : str
+        Name for reports.
+    duration : float
+        Time to simulate [s].
+    up : {"y", "z"}
+        The axis that points up; the default gravity follows it.
+    gravity : (3,) array, optional
+        Acceleration [m/s²]; 9.81 m/s² against ``up`` by default.
+    time, solver, air, contact, output : mapping, optional
+        Tables of a scene file. Without ``contact`` nothing touches anything.
+    cloth, collider : sequence of mappings
+        Bodies.
+
+    Raises
+    ------
+    InvalidScene
+        A key is not known (the nearest known one is named), a value is missing or out of range.
+
+    Examples
+    --------
+    >>> import clothsim as cs
+    >>> scene = cs.Scene(duration=0.1, contact={"thickness": 0.004})
+    >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 11, 11), "cotton", position=(0.0, 0.6, 0.0))
+    >>> scene.add_collider("ball", shape={"type": "sphere", "radius": 0.5, "tolerance": 0.01})
+    >>> scene
+    Scene('scene', cloth: cloth, colliders: ball)
+    """
+
+    def __init__(
+        self,
+        *,
+        name: str = "scene",
+        duration: float = 1.0,
+        up: str = "y",
+        gravity: ArrayLike | None = None,
+        time: Mapping[str, Any] | None = None,
+        solver: Mapping[str, Any] | None = None,
+        air: Mapping[str, Any] | None = None,
+        contact: Mapping[str, Any] | None = None,
+        cloth: Sequence[Mapping[str, Any]] = (),
+        collider: Sequence[Mapping[str, Any]] = (),
+        output: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._meshes: dict[str, Mesh] = {}
+        self._sequences: dict[str, tuple[Floats, Ints]] = {}
+        self._velocities: dict[str, Floats] = {}
+        self._core: _core.Scene | None = None
+        self.folder: Path | None = None
+        tables = {
+            "name": name, "up": up, "gravity": None if gravity is None else np.asarray(gravity), "duration": duration,
+            "time": time, "solver": solver, "air": air, "contact": contact, "output": output,
+        }  # fmt: skip
+        self._data: dict[str, Any] = plain(tables, "")
+        self._data["cloth"] = [self._cloth_table(table, f"cloth[{i}]") for i, table in enumerate(cloth)]
+        self._data["collider"] = [self._collider_table(table, f"collider[{i}]") for i, table in enumerate(collider)]
+        if cloth:
+            self.check()
+
+    # Bodies ----------------------------------------------------------------------------------------------------
+
+    def add_cloth(
+        self,
+        mesh: Mesh | Mapping[str, Any],
+        material: str | Material | Mapping[str, Any] = "cotton",
+        *,
+        name: str = "cloth",
+        **keys: Any,
+    ) -> None:
+        """Add a piece of cloth.
+
+        Parameters
+        ----------
+        mesh : Mesh or mapping
+            The mesh, or a table such as ``{"generator": "grid", …}`` or ``{"file": "skirt.obj"}``.
+        material : str, Material or mapping
+            A name in the library, or parameters.
+        name : str
+            Unique among all bodies.
+        **keys
+            Further keys of a ``[[cloth]]`` table: ``position`` [m], ``rotation``, ``velocity`` [m/s],
+            ``velocities`` (n, 3) [m/s], ``rest``, ``warp``, ``self_collision``, ``pins``.
+        """
+        table = {"name": name, "mesh": mesh, "material": material, **keys}
+        self._append("cloth", self._cloth_table(table, f"cloth[{len(self._data['cloth'])}]"))
+
+    def add_collider(self, name: str, **keys: Any) -> None:
+        """Add a body that moves as prescribed and that cloth meets.
+
+        Parameters
+        ----------
+        name : str
+            Unique among all bodies.
+        **keys
+            Exactly one of ``shape`` (``{"type": "sphere", "radius": m, "tolerance": m}``, capsule, box, plane, cone),
+            ``mesh`` (a `Mesh` or a table) and ``sequence`` (an `Animation` or a table); and ``position`` [m],
+            ``rotation``, ``keyframes``, ``friction``.
+        """
+        self._append("collider", self._collider_table({"name": name, **keys}, f"collider[{len(self._data['collider'])}]"))
+
+    def _append(self, kind: str, table: dict[str, Any]) -> None:
+        bodies = self._data[kind]
+        before, bodies[:] = list(bodies), [*bodies, table]
+        self._core = None
+        if self._data["cloth"]:
+            try:
+                self.check()
+            except InvalidScene:
+                bodies[:] = before
+                raise
+
+    def _cloth_table(self, table: Mapping[str, Any], key: str) -> dict[str, Any]:
+        out = dict(table)
+        if isinstance(out.get("mesh"), Mesh):
+            out["mesh"] = {"asset": self._keep(self._meshes, out["mesh"], str(out.get("name", "cloth")))}
+        if isinstance(out.get("material"), Material):
+            out["material"] = out["material"].to_dict()
+        velocities = out.get("velocities")
+        if velocities is not None and not isinstance(velocities, str):
+            array = floats(velocities, "velocities", "shape (n, 3)")
+            out["velocities"] = self._keep(self._velocities, array, f"{out.get('name', 'cloth')}-velocities")
+        return _table(out, key)
+
+    def _collider_table(self, table: Mapping[str, Any], key: str) -> dict[str, Any]:
+        out = dict(table)
+        if isinstance(out.get("mesh"), Mesh):
+            out["mesh"] = {"asset": self._keep(self._meshes, out["mesh"], str(out.get("name", "collider")))}
+        sequence = out.get("sequence")
+        if isinstance(sequence, Animation):
+            frames = (sequence.positions, sequence.triangles)
+            asset = self._keep(self._sequences, frames, str(out.get("name", "collider")))
+            out["sequence"] = {"asset": asset, "fps": sequence.fps}
+        return _table(out, key)
+
+    def _keep(self, where: dict[str, Any], asset: Any, name: str) -> str:
+        """Hold an array under a name that is free."""
+        candidate, number = name, 1
+        while candidate in where:
+            number += 1
+            candidate = f"{name}-{number}"
+        where[candidate] = asset
+        return candidate
+
+    # What it says ----------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """Name for reports."""
+        return str(self.to_dict()["name"])
+
+    @property
+    def duration(self) -> float:
+        """Time to simulate [s]."""
+        return float(self._data["duration"])
+
+    @property
+    def output(self) -> dict[str, Any]:
+        """What a run writes, defaults written out; a copy."""
+        return dict(self.to_dict()["output"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the tables of the scene's file, defaults written out; a copy."""
+        if not self._data["cloth"]:
+            return copy.deepcopy(self._data)
+        result: dict[str, Any] = json.loads(self.check().to_json())
+        return result
+
+    def check(self) -> _core.Scene:
+        """Refuse what cannot be simulated, as far as the scene alone tells; meshes are checked by `Simulation`.
+
+        Raises
+        ------
+        InvalidScene
+            Names file and line (of a loaded scene), key, what was expected and what came.
+        """
+        if self._core is None:
+            self._core = _core.Scene.from_json(json.dumps(self._data))
+        return self._core
+
+    # Files -----------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Scene:
+        """Read a scene file (TOML) and the mesh files that it names, relative to it.
+
+        Animated meshes are ``.npz`` files with ``positions`` (frames, n, 3) and ``triangles`` (m, 3); start velocities
+        are ``.npy`` files (n, 3).
+
+        Raises
+        ------
+        InvalidScene
+            The file cannot be read, or says something that cannot be simulated; file, line and key are named.
+        """
+        where = Path(path)
+        try:
+            text = where.read_bytes().decode("utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise InvalidScene(f"{where}: cannot read the scene: {reason}", file=str(where)) from error
+        scene = cls()
+        scene.folder = where.parent
+        scene._core = _core.Scene.from_toml(text, str(where))
+        scene._data = json.loads(scene._core.to_json())
+        scene._load_files()
+        return scene
+
+    def _load_files(self) -> None:
+        core = self.check()
+        folder = self.folder or Path()
+        for path, is_sequence, key in core.files():
+            try:
+                if is_sequence:
+                    self._sequences[path] = _read_sequence(folder / path)
+                else:
+                    self._meshes[path] = Mesh.load(folder / path)
+            except (ValueError, OSError) as error:
+                core.fail(key, "a file that can be used", str(error))
+        for i, cloth in enumerate(self._data["cloth"]):
+            velocities = cloth.get("velocities")
+            if velocities is not None and velocities.endswith(".npy"):
+                try:
+                    self._velocities[velocities] = floats(
+                        np.load(folder / velocities, allow_pickle=False), "velocities", "shape (n, 3)"
+                    )
+                except (ValueError, OSError) as error:
+                    core.fail(f"cloth[{i}].velocities", "a file that can be used", str(error))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write a scene file (TOML, defaults written out), and beside it the meshes that the scene holds as arrays.
+
+        Meshes go to ``<scene>_<name>.ply`` (``.obj`` if a UV seam needs it), animations to ``.npz``, start velocities
+        to ``.npy``. Names of files that the scene was loaded with are kept if it is saved into the same folder, else
+        those files are written too. Each file is written whole or not at all, the scene last.
+        """
+        where = Path(path)
+        data = self.to_dict()
+        stem = where.stem
+        here = self.folder is not None and self.folder.resolve() == where.parent.resolve()
+        for body in (*data["cloth"], *data["collider"]):
+            mesh = body.get("mesh") or {}
+            name = mesh.get("asset", mesh.get("file"))
+            if name is not None and not (here and "file" in mesh):
+                body["mesh"] = {"file": _save_mesh(self._meshes[name], where, f"{stem}_{file_stem(body['name'])}")}
+            sequence = body.get("sequence") or {}
+            name = sequence.get("asset") or sequence.get("file")
+            if name is not None and not (here and sequence.get("file")):
+                file = f"{stem}_{file_stem(body['name'])}.npz"
+                positions, triangles = self._sequences[name]
+                write_whole(where.with_name(file), _npz(positions=positions, triangles=triangles))
+                kept = {k: v for k, v in sequence.items() if k not in ("asset", "file")}
+                body["sequence"] = {"file": file, **kept}
+            name = body.get("velocities")
+            if name is not None and not (here and name.endswith(".npy")):
+                file = f"{stem}_{file_stem(body['name'])}_velocities.npy"
+                write_whole(where.with_name(file), _npy(self._velocities[name]))
+                body["velocities"] = file
+        write_whole(where, _core.Scene.from_json(json.dumps(data)).to_toml().encode())
+
+    def assets(
+        self,
+    ) -> tuple[
+        dict[str, tuple[Floats, Ints, Floats | None]], dict[str, tuple[Floats, Ints]], dict[str, Floats]
+    ]:
+        """Return the arrays that the scene holds by name: meshes, animated meshes, start velocities."""
+        meshes = {name: (mesh.vertices, mesh.triangles, mesh.uv) for name, mesh in self._meshes.items()}
+        return meshes, dict(self._sequences), dict(self._velocities)
+
+    def __repr__(self) -> str:
+        cloth = ", ".join(str(c["name"]) for c in self._data["cloth"]) or "none"
+        colliders = ", ".join(str(c["name"]) for c in self._data["collider"]) or "none"
+        return f"Scene({self._data['name']!r}, cloth: {cloth}, colliders: {colliders})"
+
+
+def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
+    out: dict[str, Any] = plain(table, key)
+    return out
+
+
+def _save_mesh(mesh: Mesh, scene: Path, stem: str) -> str:
+    raw = RawMesh(mesh.vertices, mesh.triangles, mesh.uv)
+    for suffix in (".ply", ".obj"):
+        path = scene.with_name(stem + suffix)
+        content = _formats.write(path, raw)
+        if suffix == ".obj" or mesh.uv is None or _formats.parse(content, path).uv is not None:
+            write_whole(path, content)
+            return path.name
+    raise AssertionError("an OBJ file holds every mesh")
+
+
+def _read_sequence(path: Path) -> tuple[Floats, Ints]:
+    with np.load(path, allow_pickle=False) as data:
+        for name in ("positions", "triangles"):
+            if name not in data:
+                raise MeshError(f"{path}: expected arrays positions and triangles, got {sorted(data)}", kind="file")
+        animation = Animation(data["positions"], data["triangles"], 1.0)
+    return animation.positions, animation.triangles
+
+
+def _npz(**arrays: Any) -> bytes:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def _npy(array: Floats) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, array, allow_pickle=False)
+    return buffer.getvalue()

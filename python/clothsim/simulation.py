@@ -1,0 +1,379 @@
+"""A scene being simulated."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clothsim import _core
+from clothsim._arrays import Floats, Ints, optional
+from clothsim._device import check_device, check_threads
+from clothsim._files import write_whole
+from clothsim.errors import CheckpointError, InvalidInput
+from clothsim.recording import Body, Recording
+from clothsim.scene import Scene
+
+__all__ = ["Frame", "Plan", "Simulation", "record"]
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The state at one moment of a run.
+
+    Attributes
+    ----------
+    index : int
+        Number of the frame; 0 is the state at which the run began.
+    time : float
+        Simulated time [s].
+    positions : (n, 3) float64
+        Positions of all cloth vertices [m].
+    velocities : (n, 3) float64
+        Their velocities [m/s].
+    collider_positions : (k, 3) float64
+        Positions of all collider vertices [m].
+    """
+
+    index: int
+    time: float
+    positions: Floats
+    velocities: Floats
+    collider_positions: Floats
+
+
+class Plan(dict[str, Any]):
+    """Which effects run and why, as the tables of its JSON; ``print`` it for a table to read."""
+
+    def __init__(self, tables: dict[str, Any], text: str) -> None:
+        super().__init__(tables)
+        self._text = text
+
+    def __str__(self) -> str:
+        return self._text
+
+    def __repr__(self) -> str:
+        return f"Plan(on: {', '.join(self.running)})"
+
+    @property
+    def running(self) -> list[str]:
+        """Names of the effects that run, in the order of the step."""
+        return [effect["name"] for effect in self["effects"] if effect["on"]]
+
+
+class Simulation:
+    """A scene being simulated.
+
+    Long calls release the interpreter, so that other threads go on; threads may share a simulation, each call has it
+    alone. Ctrl-C stops between two steps and leaves the state of the last one.
+
+    Parameters
+    ----------
+    scene : Scene
+        What to simulate.
+    threads : int, optional
+        How many threads; all of the machine's by default. Results do not depend on it.
+    device : {"auto", "cpu"}
+        Where to detect collisions.
+    allow_intersections : bool
+        Run from a start with intersections, even if the scene does not say so.
+
+    Raises
+    ------
+    InvalidScene
+        A value or a mesh cannot be used; file, line and key are named.
+    IntersectingStart
+        Triangles pass through each other at the start; how many and which are named.
+
+    Examples
+    --------
+    >>> import clothsim as cs
+    >>> scene = cs.Scene(duration=0.1)
+    >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton", pins=[{"vertices": [0, 5]}])
+    >>> sim = cs.Simulation(scene, threads=1)
+    >>> sim.advance(0.05)
+    >>> round(sim.time, 6), sim.positions.shape
+    (0.05, (36, 3))
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        threads: int | None = None,
+        device: str = "auto",
+        *,
+        allow_intersections: bool = False,
+    ) -> None:
+        check_device(device)
+        self._core = _core.Simulation(
+            scene.check(), *scene.assets(), check_threads(threads), bool(allow_intersections)
+        )
+
+    @classmethod
+    def _over(cls, core: _core.Simulation) -> Simulation:
+        simulation = cls.__new__(cls)
+        simulation._core = core
+        return simulation
+
+    # Stepping --------------------------------------------------------------------------------------------------
+
+    def step(self) -> dict[str, Any]:
+        """Take one step of the scene's ``time.dt`` and return its report: counts, residuals, seconds per stage.
+
+        Raises
+        ------
+        SimulationDiverged, SimulationStuck
+            The step failed at every size tried; the state is the last good one.
+        """
+        self._core.step()
+        last: dict[str, Any] = json.loads(self._core.steps(self._step_reports() - 1))[0]
+        return last
+
+    def advance(self, seconds: float) -> None:
+        """Advance by ``seconds`` [s] in equal steps of at most the scene's ``time.dt``.
+
+        Raises
+        ------
+        SimulationDiverged, SimulationStuck
+            A step failed at every size tried; the state is the last good one.
+        KeyboardInterrupt
+            Between two steps; `finish_advance` (also after a checkpoint) does the rest with the same steps.
+        """
+        self._core.advance(float(seconds))
+
+    def finish_advance(self) -> None:
+        """Do what an interrupted `advance` has left, to the same bits as without the interruption."""
+        self._core.finish_advance()
+
+    def run(self, seconds: float | None = None, fps: float = 60.0, progress: bool = True) -> Iterator[Frame]:
+        """Yield the state now and then ``fps`` times per simulated second.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            How long [s]; what is left of the scene's duration by default. Where it is no whole number of frames, the
+            last frame comes sooner.
+        fps : float
+            Frames per simulated second.
+        progress : bool
+            Show a bar with an estimate on stderr.
+
+        Yields
+        ------
+        Frame
+            Its arrays are copies.
+
+        Examples
+        --------
+        >>> import clothsim as cs
+        >>> scene = cs.Scene(duration=0.1)
+        >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton", pins=[{"vertices": [0, 5]}])
+        >>> [round(frame.time, 3) for frame in cs.Simulation(scene).run(fps=20, progress=False)]
+        [0.0, 0.05, 0.1]
+        """
+        if seconds is None:
+            seconds = max(0.0, float(json.loads(self._core.scene())["duration"]) - self.time)
+        lengths = frame_lengths(seconds, fps)
+        bar = progress_bar(len(lengths), enabled=progress)
+        try:
+            yield self.frame(0)
+            for index, length in enumerate(lengths, start=1):
+                self.advance(length)
+                bar.update()
+                yield self.frame(index)
+        finally:
+            bar.close()
+
+    def frame(self, index: int = 0) -> Frame:
+        """Return the state now, as a frame of that number."""
+        return Frame(index, self.time, self.positions, self.velocities, self.collider_positions)
+
+    # State -----------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self._core.time
+
+    @property
+    def positions(self) -> Floats:
+        """Positions of all cloth vertices [m], shape (n, 3), cloth after cloth in scene order; a copy."""
+        return self._core.positions()
+
+    @property
+    def velocities(self) -> Floats:
+        """Velocities of all cloth vertices [m/s], shape (n, 3); a copy."""
+        return self._core.velocities()
+
+    @property
+    def collider_positions(self) -> Floats:
+        """Positions of all collider vertices [m], shape (k, 3); a copy."""
+        return self._core.collider_positions()
+
+    @property
+    def masses(self) -> Floats:
+        """Lumped mass of each cloth vertex [kg], shape (n,); a copy."""
+        return self._core.masses()
+
+    @property
+    def energy(self) -> dict[str, float]:
+        """Mechanical energy of the cloth [J]: kinetic, stretch, shear, bending, gravity, and their total."""
+        energy: dict[str, float] = json.loads(self._core.energy())
+        return {**energy, "total": sum(energy.values())}
+
+    @property
+    def bodies(self) -> list[Body]:
+        """Names and meshes of all bodies, cloth first, in scene order."""
+        moving = self._moving_colliders()
+        bodies = []
+        for name, kind, (first, last), (_, triangles, uv) in self._core.bodies():
+            if kind == "cloth":
+                bodies.append(Body(name, "cloth", last - first, triangles, uv))
+            else:
+                bodies.append(Body(name, "collider", last - first, triangles, uv, name not in moving))
+        return bodies
+
+    def _moving_colliders(self) -> set[str]:
+        colliders = json.loads(self._core.scene())["collider"]
+        return {c["name"] for c in colliders if c.get("keyframes") or c.get("sequence")}
+
+    def intersections(self) -> Ints:
+        """Pairs of triangles that pass through each other now, shape (k, 2), under the scene's rules of contact.
+
+        Triangles are counted through all bodies. Without contact in the scene there are none.
+        """
+        return self._core.intersections()
+
+    # What runs and what it cost --------------------------------------------------------------------------------
+
+    @property
+    def plan(self) -> Plan:
+        """Which effects run and why; ``print(sim.plan)`` for a table."""
+        tables, text = self._core.plan()
+        return Plan(json.loads(tables), text)
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What happened so far: ``steps`` (one table each), ``totals``, ``effects`` with their cost, ``threads``."""
+        report: dict[str, Any] = json.loads(self._core.summary())
+        report["steps"] = json.loads(self._core.steps(0))
+        return report
+
+    def _step_reports(self) -> int:
+        return int(json.loads(self._core.summary())["totals"]["steps"])
+
+    # Checkpoints -----------------------------------------------------------------------------------------------
+
+    def save_checkpoint(self, path: str | os.PathLike[str]) -> None:
+        """Write scene, meshes and the full state to a file, whole or not at all."""
+        write_whole(Path(path), self._core.checkpoint())
+
+    @classmethod
+    def resume(cls, path: str | os.PathLike[str], threads: int | None = None) -> Simulation:
+        """Go on from a checkpoint, to the same bits as if the run had not been interrupted.
+
+        Raises
+        ------
+        CheckpointError
+            The file cannot be read, is no checkpoint, of another version, cut off or damaged.
+        """
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise CheckpointError(f"{path}: cannot read the checkpoint: {error.strerror or error}") from error
+        return cls._from_bytes(content, threads)
+
+    @classmethod
+    def _from_bytes(cls, content: bytes, threads: int | None) -> Simulation:
+        return cls._over(_core.Simulation.resume(content, check_threads(threads)))
+
+    def __repr__(self) -> str:
+        cloth = sum(b.vertex_count for b in self.bodies if b.kind == "cloth")
+        return f"Simulation({cloth} cloth vertices, t = {self.time:g} s)"
+
+
+def frame_lengths(seconds: float, fps: float) -> list[float]:
+    """Time from each frame to the next [s]: 1/fps, the last one shorter where ``seconds`` ends within a frame."""
+    rounding = 1e-9  # a whole number of frames but for rounding makes no extra frame
+    for name, value in (("seconds", seconds), ("fps", fps)):
+        if not (math.isfinite(value) and (value > 0.0 if name == "fps" else value >= 0.0)):
+            expected = "a finite number > 0 [1/s]" if name == "fps" else "a finite number ≥ 0 [s]"
+            raise InvalidInput(
+                f"{name}: expected {expected}, got {value}", name=name, expected=expected, got=str(value)
+            )
+    count = math.ceil(seconds * fps - rounding)
+    lengths = [1.0 / fps] * count
+    whole = math.floor(seconds * fps + rounding)
+    if count > whole:
+        lengths[-1] = seconds - whole / fps
+    return lengths
+
+
+def progress_bar(total: int, *, initial: int = 0, enabled: bool = True, name: str = "") -> Any:
+    """Return a bar with an estimate of the time left, on stderr."""
+    tqdm = optional("tqdm", extra="all", purpose="showing progress")
+    return tqdm.tqdm(
+        total=total, initial=initial, disable=not enabled, unit="frame", desc=name or None, dynamic_ncols=True
+    )
+
+
+def record(
+    simulation: Simulation, seconds: float | None = None, fps: float = 60.0, *, progress: bool = True
+) -> Recording:
+    """Run a simulation and keep its frames, to save, render or look at.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Where to go on from.
+    seconds, fps, progress
+        As for `Simulation.run`.
+
+    Returns
+    -------
+    Recording
+
+    Examples
+    --------
+    >>> import clothsim as cs
+    >>> scene = cs.Scene(duration=0.1)
+    >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton", pins=[{"vertices": [0, 5]}])
+    >>> cs.record(cs.Simulation(scene), fps=20, progress=False)
+    Recording(3 frames of cloth, 0 s to 0.1 s)
+    """
+    bodies = simulation.bodies
+    scene = json.loads(simulation._core.scene())
+    rows, times = [], []
+    standing = standing_positions(bodies, simulation.collider_positions)
+    for frame in simulation.run(seconds, fps, progress):
+        rows.append(moving_positions(bodies, frame.positions, frame.collider_positions))
+        times.append(frame.time)
+    return Recording(
+        bodies, np.array(times), np.array(rows), standing, fps=fps, up=scene["up"], name=scene["name"]
+    )
+
+
+def moving_positions(bodies: list[Body], cloth: Floats, colliders: Floats) -> Floats:
+    """Positions of what is not static: all cloth, then the colliders that move."""
+    return np.concatenate([cloth, *_collider_parts(bodies, colliders, static=False)])
+
+
+def standing_positions(bodies: list[Body], colliders: Floats) -> Floats:
+    """Positions of the colliders that stand still."""
+    return np.concatenate([np.zeros((0, 3)), *_collider_parts(bodies, colliders, static=True)])
+
+
+def _collider_parts(bodies: list[Body], positions: Floats, *, static: bool) -> list[Floats]:
+    parts, first = [], 0
+    for body in bodies:
+        if body.kind == "collider":
+            if body.static == static:
+                parts.append(positions[first : first + body.vertex_count])
+            first += body.vertex_count
+    return parts
