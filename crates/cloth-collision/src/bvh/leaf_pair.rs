@@ -14,37 +14,67 @@ pub(super) struct Candidates {
 }
 
 /// Pairs of features of the leaves `a` and `b` (once each if they are equal) whose boxes overlap. Pairs that share a
-/// vertex are among them.
+/// vertex are among them, and pairs with an unused lane ([`cloth_mesh::NONE`]) where boxes reach to infinity.
 #[inline]
-pub(super) fn visit(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Candidates) {
+pub(super) fn features(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Candidates) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
-        unsafe { visit_avx2(tree, boxes, a, b, out) };
+        unsafe { features_avx2(tree, boxes, a, b, out) };
         return;
     }
-    visit_with(tree, boxes, a, b, out, overlap_mask);
+    features_with(tree, boxes, a, b, out, overlap_mask);
+}
+
+/// Pairs of triangles of the leaves `a` and `b` (once each if they are equal) whose boxes overlap, as in
+/// [`features`].
+#[inline]
+pub(super) fn triangles(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Vec<[u32; 2]>) {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2.
+        unsafe { triangles_avx2(tree, boxes, a, b, out) };
+        return;
+    }
+    triangles_with(tree, boxes, a, b, out, overlap_mask);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn visit_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Candidates) {
-    visit_with(
-        tree,
-        boxes,
-        a,
-        b,
-        out,
-        #[inline(always)]
-        |bounds, block| {
-            // SAFETY: this function runs only where the processor has AVX2.
-            unsafe { overlap_mask_avx2(bounds, block) }
-        },
-    );
+fn features_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Candidates) {
+    features_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2(bounds, block));
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn triangles_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Vec<[u32; 2]>) {
+    triangles_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2(bounds, block));
 }
 
 #[inline(always)]
-fn visit_with(
+fn triangles_with(
+    tree: &Tree,
+    boxes: &Boxes,
+    a: u32,
+    b: u32,
+    out: &mut Vec<[u32; 2]>,
+    overlap: impl Fn(&MovingBox, &Block) -> u32 + Copy,
+) {
+    let box_b = &boxes.nodes[tree.leaves[b as usize].node as usize];
+    let (blocks_a, blocks_b) = (&boxes.triangle_blocks[a as usize], &boxes.triangle_blocks[b as usize]);
+    for lane in lanes(overlap(box_b, blocks_a)) {
+        let mut hits = overlap(&blocks_a.get(lane), blocks_b);
+        if a == b {
+            hits &= !0 << (lane + 1);
+        }
+        for hit in lanes(hits) {
+            out.push([tree.triangle_ids[a as usize][lane], tree.triangle_ids[b as usize][hit]]);
+        }
+    }
+}
+
+#[inline(always)]
+fn features_with(
     tree: &Tree,
     boxes: &Boxes,
     a: u32,

@@ -5,6 +5,7 @@
 //! [`narrow`] decides what they yield while it streams by.
 
 mod build;
+mod intersections;
 mod leaf_pair;
 mod narrow;
 mod proximity;
@@ -18,6 +19,7 @@ use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use build::Tree;
 use refit::Boxes;
 use std::time::Instant;
+use traverse::Streaming;
 
 /// Triangles of a full leaf: one block.
 const LEAF_TRIANGLES: usize = LANES;
@@ -97,9 +99,9 @@ impl Detector for Bvh {
         let start = Instant::now();
         self.refit(mesh, query, pool);
         let fitted = Instant::now();
-        let (sinks, counts) = self.traverse(mesh, pool, || narrow::Narrow::new(mesh, query));
+        let (visits, counts) = self.traverse(mesh, pool, || Streaming::new(narrow::Narrow::new(mesh, query)));
         let traversed = Instant::now();
-        let mut out = narrow::merge(sinks);
+        let mut out = narrow::merge(visits.into_iter().map(|v| v.sink));
         out.stats.broad_phase_tests = counts.box_tests;
         out.stats.leaf_pairs = counts.leaf_pairs;
         out.stats.seconds = vec![

@@ -65,7 +65,7 @@ impl Sink for Narrow<'_> {
 }
 
 /// All contacts, sorted. Each pair comes from one task only.
-pub(super) fn merge(sinks: Vec<Narrow<'_>>) -> Contacts {
+pub(super) fn merge<'a>(sinks: impl Iterator<Item = Narrow<'a>>) -> Contacts {
     let mut out = Contacts::default();
     let (mut vertex_triangle, mut edge_edge) = (vec![], vec![]);
     for sink in sinks {

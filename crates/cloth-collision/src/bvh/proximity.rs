@@ -1,7 +1,7 @@
 //! Pairs within a distance of each other at one state, with their closest points.
 
 use super::Bvh;
-use super::traverse::{Candidates, Sink};
+use super::traverse::{Candidates, Sink, Streaming};
 use crate::distance::{edge_edge, vertex_triangle};
 use crate::{CollisionMesh, DetectError, Mode, Query, Stencil, StencilKind, Vec3};
 use cloth_mesh::NONE;
@@ -33,15 +33,11 @@ impl Bvh {
         query.check(mesh)?;
         self.check_mesh(mesh)?;
         self.refit(mesh, &query, pool);
-        let (sinks, _) = self.traverse(mesh, pool, || Near {
-            mesh,
-            query: &query,
-            vertex_triangle: vec![],
-            edge_edge: vec![],
-        });
+        let sink = || Near { mesh, query: &query, vertex_triangle: vec![], edge_edge: vec![] };
+        let (visits, _) = self.traverse(mesh, pool, || Streaming::new(sink()));
 
         let (mut vertex_triangle, mut edge_edge) = (vec![], vec![]);
-        for sink in sinks {
+        for Streaming { sink, .. } in visits {
             vertex_triangle.extend(sink.vertex_triangle);
             edge_edge.extend(sink.edge_edge);
         }

@@ -22,10 +22,49 @@ pub(super) struct TraverseCounts {
     pub(super) leaf_pairs: u64,
 }
 
-/// What is done with candidates; one per task, handed back in the order of the tasks.
+/// What is done with the pairs of leaves of one task; the visits of all tasks are handed back in their order.
+pub(super) trait Visit: Send {
+    /// Two leaves whose boxes overlap (or one, twice).
+    fn leaf_pair(&mut self, leaves: &LeafPairs<'_>, a: u32, b: u32);
+    /// There is no further pair.
+    fn finish(&mut self);
+}
+
+/// The leaves that a [`Visit`] is called with.
+pub(super) struct LeafPairs<'a> {
+    pub(super) tree: &'a Tree,
+    pub(super) boxes: &'a Boxes,
+}
+
+/// What is done with candidates.
 pub(super) trait Sink: Send {
     /// Takes the waiting candidates out.
     fn take(&mut self, candidates: &mut Candidates);
+}
+
+/// Streams the feature pairs of leaves into a sink.
+pub(super) struct Streaming<S> {
+    candidates: Candidates,
+    pub(super) sink: S,
+}
+
+impl<S> Streaming<S> {
+    pub(super) fn new(sink: S) -> Self {
+        Self { candidates: Candidates::default(), sink }
+    }
+}
+
+impl<S: Sink> Visit for Streaming<S> {
+    fn leaf_pair(&mut self, leaves: &LeafPairs<'_>, a: u32, b: u32) {
+        leaf_pair::features(leaves.tree, leaves.boxes, a, b, &mut self.candidates);
+        if self.candidates.vertex_triangle.len() + self.candidates.edge_edge.len() > FLUSH {
+            self.sink.take(&mut self.candidates);
+        }
+    }
+
+    fn finish(&mut self) {
+        self.sink.take(&mut self.candidates);
+    }
 }
 
 struct Walk<'a> {
@@ -100,9 +139,9 @@ impl Walk<'_> {
         }
     }
 
-    fn run<S: Sink>(&self, task: (u32, u32), sink: &mut S) -> TraverseCounts {
+    fn run<V: Visit>(&self, task: (u32, u32), visit: &mut V) -> TraverseCounts {
         let mut counts = TraverseCounts::default();
-        let mut candidates = Candidates::default();
+        let leaves = LeafPairs { tree: self.tree, boxes: self.boxes };
         let mut stack = vec![task];
         while let Some((a, b)) = stack.pop() {
             let expanded = self.expand((a, b), &mut |child| {
@@ -114,45 +153,42 @@ impl Walk<'_> {
             if !expanded {
                 counts.leaf_pairs += 1;
                 let leaf = |n: u32| self.tree.nodes[n as usize].leaf;
-                leaf_pair::visit(self.tree, self.boxes, leaf(a), leaf(b), &mut candidates);
-                if candidates.vertex_triangle.len() + candidates.edge_edge.len() > FLUSH {
-                    sink.take(&mut candidates);
-                }
+                visit.leaf_pair(&leaves, leaf(a), leaf(b));
             }
         }
-        sink.take(&mut candidates);
+        visit.finish();
         counts
     }
 }
 
 impl Bvh {
-    /// Streams all candidates through sinks, one per task.
-    pub(super) fn traverse<S: Sink>(
+    /// Meets the tree with itself: one visit per task.
+    pub(super) fn traverse<V: Visit>(
         &self,
         mesh: &CollisionMesh,
         pool: &rayon::ThreadPool,
-        sink: impl Fn() -> S + Sync,
-    ) -> (Vec<S>, TraverseCounts) {
+        visit: impl Fn() -> V + Sync,
+    ) -> (Vec<V>, TraverseCounts) {
         let walk = Walk { tree: &self.tree, boxes: &self.boxes, mesh };
         let mut counts = TraverseCounts::default();
         let tasks = walk.tasks(&mut counts);
-        let results: Vec<(S, TraverseCounts)> = pool.install(|| {
+        let results: Vec<(V, TraverseCounts)> = pool.install(|| {
             tasks
                 .par_iter()
                 .with_max_len(1)
                 .map(|&task| {
-                    let mut sink = sink();
-                    let counts = walk.run(task, &mut sink);
-                    (sink, counts)
+                    let mut visit = visit();
+                    let counts = walk.run(task, &mut visit);
+                    (visit, counts)
                 })
                 .collect()
         });
-        let mut sinks = Vec::with_capacity(results.len());
-        for (sink, task) in results {
+        let mut visits = Vec::with_capacity(results.len());
+        for (visit, task) in results {
             counts.box_tests += task.box_tests;
             counts.leaf_pairs += task.leaf_pairs;
-            sinks.push(sink);
+            visits.push(visit);
         }
-        (sinks, counts)
+        (visits, counts)
     }
 }
