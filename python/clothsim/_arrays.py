@@ -47,5 +47,5 @@ def optional(module: str, *, extra: str, purpose: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        message = f"{purpose} needs the package {module.split('.')[0]}: pip install 'clothsim[{extra}]'"
+        message = f"{purpose} needs the package {module.split('.', maxsplit=1)[0]}: pip install 'clothsim[{extra}]'"
         raise MissingDependency(message) from error

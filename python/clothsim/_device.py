@@ -14,7 +14,7 @@ def check_device(device: str) -> str:
     if device in ("cpu", "auto"):
         return "cpu"
     if device == "gpu":
-        raise GpuUnavailable("device: this build detects collisions on the CPU only; use \"cpu\" or \"auto\"")
+        raise GpuUnavailable('device: this build detects collisions on the CPU only; use "cpu" or "auto"')
     raise InvalidInput(
         f'device: expected one of "cpu", "auto", got {device!r}',
         name="device",

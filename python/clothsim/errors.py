@@ -164,9 +164,7 @@ class SimulationStuck(ClothSimError):
         How many pairs still collide.
     """
 
-    def __init__(
-        self, message: str, *, time: float = 0.0, vertices: Sequence[int] = (), count: int = 0
-    ) -> None:
+    def __init__(self, message: str, *, time: float = 0.0, vertices: Sequence[int] = (), count: int = 0) -> None:
         super().__init__(message)
         self.time = time
         self.vertices = tuple(vertices)

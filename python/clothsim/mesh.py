@@ -190,7 +190,7 @@ class Mesh:
             raise
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an OBJ file (with UV per corner) or a binary PLY file (UV where each vertex has one), whole or not at all."""
+        """Write an OBJ file (UV per corner) or a binary PLY file (UV if each vertex has one), whole or not at all."""
         where = Path(path)
         write_whole(where, _formats.write(where, RawMesh(self._vertices, self._triangles, self._uv)))
 

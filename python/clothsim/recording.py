@@ -134,8 +134,8 @@ class Recording:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write everything to one ``.npz``, whole or not at all; equal recordings give equal bytes.
 
-        ``positions`` (frames, n, 3), ``triangles`` (m, 3) and ``uv`` (m, 3, 2; NaN where a cloth has none) hold all cloths
-        joined; ``times`` (frames,); ``collider_0_positions`` (frames or 1 if static, n, 3) and
+        ``positions`` (frames, n, 3), ``triangles`` (m, 3) and ``uv`` (m, 3, 2; NaN where a cloth has none) hold all
+        cloths joined; ``times`` (frames,); ``collider_0_positions`` (frames or 1 if static, n, 3) and
         ``collider_0_triangles`` each collider; ``meta`` a JSON text with names, ranges, fps and the up axis.
         """
         with whole(Path(path)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:

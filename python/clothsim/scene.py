@@ -45,7 +45,9 @@ class Animation:
         self.fps = float(fps)
         if self.positions.ndim != 3 or self.positions.shape[2] != 3:
             expected, got = "shape (frames, n, 3)", f"shape {self.positions.shape}"
-            raise InvalidInput(f"positions: expected {expected}, got {got}", name="positions", expected=expected, got=got)
+            raise InvalidInput(
+                f"positions: expected {expected}, got {got}", name="positions", expected=expected, got=got
+            )
 
 
 class Scene:
@@ -153,7 +155,9 @@ class Scene:
             ``mesh`` (a `Mesh` or a table) and ``sequence`` (an `Animation` or a table); and ``position`` [m],
             ``rotation``, ``keyframes``, ``friction``.
         """
-        self._append("collider", self._collider_table({"name": name, **keys}, f"collider[{len(self._data['collider'])}]"))
+        self._append(
+            "collider", self._collider_table({"name": name, **keys}, f"collider[{len(self._data['collider'])}]")
+        )
 
     def _append(self, kind: str, table: dict[str, Any]) -> None:
         bodies = self._data[kind]
@@ -315,9 +319,7 @@ class Scene:
 
     def assets(
         self,
-    ) -> tuple[
-        dict[str, tuple[Floats, Ints, Floats | None]], dict[str, tuple[Floats, Ints]], dict[str, Floats]
-    ]:
+    ) -> tuple[dict[str, tuple[Floats, Ints, Floats | None]], dict[str, tuple[Floats, Ints]], dict[str, Floats]]:
         """Return the arrays that the scene holds by name: meshes, animated meshes, start velocities."""
         meshes = {name: (mesh.vertices, mesh.triangles, mesh.uv) for name, mesh in self._meshes.items()}
         return meshes, dict(self._sequences), dict(self._velocities)

@@ -111,9 +111,7 @@ class Simulation:
         allow_intersections: bool = False,
     ) -> None:
         check_device(device)
-        self._core = _core.Simulation(
-            scene.check(), *scene.assets(), check_threads(threads), bool(allow_intersections)
-        )
+        self._core = _core.Simulation(scene.check(), *scene.assets(), check_threads(threads), bool(allow_intersections))
 
     @classmethod
     def _over(cls, core: _core.Simulation) -> Simulation:
@@ -354,9 +352,7 @@ def record(
     for frame in simulation.run(seconds, fps, progress):
         rows.append(moving_positions(bodies, frame.positions, frame.collider_positions))
         times.append(frame.time)
-    return Recording(
-        bodies, np.array(times), np.array(rows), standing, fps=fps, up=scene["up"], name=scene["name"]
-    )
+    return Recording(bodies, np.array(times), np.array(rows), standing, fps=fps, up=scene["up"], name=scene["name"])
 
 
 def moving_positions(bodies: list[Body], cloth: Floats, colliders: Floats) -> Floats:

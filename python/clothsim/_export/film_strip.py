@@ -83,7 +83,7 @@ def render(recording: Recording, frame: int, size: tuple[int, int] = _TILE) -> A
             if not _is_backdrop(recording, body, reach):
                 _add_body(pv, plotter, recording, body, frame, number)
         _add_lights(pv, plotter, centre, reach, up)
-        _place_camera(plotter, recording, low, high, up)
+        _place_camera(plotter, low, high, up)
         plotter.enable_shadows()
         _refine_shadows(plotter)
         image = plotter.screenshot(None, return_img=True)
@@ -133,9 +133,7 @@ def _add_body(pv: Any, plotter: Any, recording: Recording, body: Body, frame: in
         return
     front, back = _CLOTHS[number % len(_CLOTHS)]
     look = {"ambient": 0.25, "diffuse": 0.8, "specular": 0.08, "specular_power": 8}
-    plotter.add_mesh(
-        surface, color=front, smooth_shading=True, backface_params={"color": back, **look}, **look
-    )
+    plotter.add_mesh(surface, color=front, smooth_shading=True, backface_params={"color": back, **look}, **look)
 
 
 def _add_floor(pv: Any, plotter: Any, centre: Floats, reach: float, floor: float, up: int) -> None:
@@ -178,7 +176,7 @@ def _unit(vector: Floats) -> Floats:
     return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
 
 
-def _place_camera(plotter: Any, recording: Recording, low: Floats, high: Floats, up: int) -> None:
+def _place_camera(plotter: Any, low: Floats, high: Floats, up: int) -> None:
     """Looks down a little from the front right, so that everything just fits."""
     right, upward, front = _axes(up)
     view = 0.5 * right + 0.55 * upward + 1.0 * front

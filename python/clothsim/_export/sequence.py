@@ -41,4 +41,3 @@ def write(recording: Recording, folder: Path, suffix: str, *, overwrite: bool = 
         raise output_error(folder, error) from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
-

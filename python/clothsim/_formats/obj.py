@@ -1,6 +1,7 @@
 """Wavefront OBJ.
 
-Read here rather than through trimesh, which splits vertices at UV seams: cloth would come apart along each seam.
+Read here rather than through trimesh, which splits vertices at UV seams, so that cloth comes apart along each seam,
+or keeps the vertices and drops the UV of one side.
 Vertices keep the file's order, polygons are triangulated in place, and UV is kept per corner.
 """
 
@@ -72,9 +73,7 @@ def _index(word: str, count: int, what: str) -> int:
     return index
 
 
-def _triangles(
-    faces: list[tuple[list[int], list[int]]], points: Floats
-) -> tuple[list[list[int]], list[list[int]]]:
+def _triangles(faces: list[tuple[list[int], list[int]]], points: Floats) -> tuple[list[list[int]], list[list[int]]]:
     corners: list[list[int]] = []
     uv_corners: list[list[int]] = []
     for face, uv in faces:

@@ -7,6 +7,7 @@ that mix triangles with other polygons.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -155,7 +156,7 @@ class _Binary:
         self.order = order
         self.at = 0
 
-    def read(self, element: _Element) -> dict[str, list[object]] | dict[str, Floats]:
+    def read(self, element: _Element) -> dict[str, Any]:
         if element.count == 0:
             return {p.name: [] for p in element.properties}
         lengths = self._first_lengths(element)

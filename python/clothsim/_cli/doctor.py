@@ -1,0 +1,141 @@
+"""``clothsim doctor``."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.metadata
+import json
+import os
+import platform
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from clothsim import _core
+from clothsim._data import VARIABLE, data_folder
+
+__all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
+
+NAME = "doctor"
+HELP = "Say what this machine offers: threads, processor, GPU adapters, packages, data."
+EXAMPLE = "clothsim doctor"
+
+_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f", "asimd")
+# Optional packages and what they are for.
+_OPTIONAL = {
+    "trimesh": "reading STL and glTF",
+    "usd-core": "writing USD",
+    "pyvista": "film strips",
+    "matplotlib": "plots",
+}
+_TIMEOUT = 20  # s, for a driver that hangs
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """There are none."""
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Print the findings."""
+    facts = findings()
+    print(json.dumps(facts) if options.json else _text(facts))
+    return 0
+
+
+def findings() -> dict[str, Any]:
+    """Everything that ``clothsim doctor`` says."""
+    data = data_folder()
+    return {
+        "clothsim": _core.__version__,
+        "build": _core.BUILD_PROFILE,
+        "python": platform.python_version(),
+        "numpy": _version("numpy"),
+        "system": f"{platform.system()} {platform.release()} ({platform.machine()})",
+        "processor": _processor(),
+        "threads": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "memory_gib": _memory(),
+        "gpu": gpu_adapters(),
+        "packages": {name: _version(name) for name in _OPTIONAL},
+        "data": None if data is None else str(data),
+    }
+
+
+def _version(package: str) -> str | None:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _processor() -> dict[str, Any]:
+    model, flags = platform.processor(), set()
+    for line in _lines(Path("/proc/cpuinfo")):
+        key, _, value = line.partition(":")
+        if key.strip() == "model name":
+            model = value.strip()
+        elif key.strip() in ("flags", "Features"):
+            flags = set(value.split())
+            break
+    return {"model": model, "features": [name for name in _FEATURES if name in flags]}
+
+
+def _memory() -> float | None:
+    for line in _lines(Path("/proc/meminfo")):
+        if line.startswith("MemTotal:"):
+            return round(int(line.split()[1]) / 2**20, 1)
+    return None
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return path.read_text().splitlines()
+    except OSError:
+        return []
+
+
+def gpu_adapters() -> dict[str, Any]:
+    """Vulkan adapters as ``vulkaninfo`` lists them; without it, the drivers that are installed."""
+    note = "this build detects collisions on the CPU; adapters are listed for information"
+    tool = shutil.which("vulkaninfo")
+    if tool is None:
+        folders = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+        drivers = sorted(file.stem for folder in folders if folder.is_dir() for file in folder.glob("*.json"))
+        return {"adapters": [], "drivers": drivers, "note": f"{note}; vulkaninfo (vulkan-tools) is not installed"}
+    try:
+        summary = subprocess.run(
+            [tool, "--summary"], capture_output=True, text=True, timeout=_TIMEOUT, check=False
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return {"adapters": [], "drivers": [], "note": f"{note}; vulkaninfo failed: {error}"}
+    adapters: list[dict[str, str]] = []
+    for line in summary.splitlines():
+        key, _, value = (part.strip() for part in line.partition("="))
+        if line.startswith("GPU") and line.rstrip().endswith(":"):
+            adapters.append({})
+        elif adapters and key in ("deviceName", "deviceType", "driverName", "driverInfo", "apiVersion"):
+            adapters[-1][key] = value
+    return {"adapters": adapters, "drivers": [], "note": note}
+
+
+def _text(facts: dict[str, Any]) -> str:
+    processor = facts["processor"]
+    rows = [
+        ("clothsim", f"{facts['clothsim']} ({facts['build']} build)"),
+        ("Python", f"{facts['python']}, NumPy {facts['numpy']}"),
+        ("system", facts["system"]),
+        ("processor", f"{processor['model']}; {' '.join(processor['features']) or 'no features listed'}"),
+        ("threads", f"{facts['threads']}; memory {facts['memory_gib']} GiB"),
+    ]
+    gpu = facts["gpu"]
+    for adapter in gpu["adapters"]:
+        name, kind = adapter.get("deviceName", "?"), adapter.get("deviceType", "?")
+        rows.append(("GPU", f"{name} ({kind}, {adapter.get('driverInfo', adapter.get('driverName', '?'))})"))
+    if not gpu["adapters"]:
+        rows.append(("GPU", f"no adapter seen; Vulkan drivers: {', '.join(gpu['drivers']) or 'none'}"))
+    rows.append(("", gpu["note"]))
+    for name, purpose in _OPTIONAL.items():
+        version = facts["packages"][name]
+        rows.append((name, f"{version or 'not installed'}  ({purpose})"))
+    rows.append(("test data", facts["data"] or f"not found: set ${VARIABLE}"))
+    return "\n".join(f"{key:<12}{value}" for key, value in rows)

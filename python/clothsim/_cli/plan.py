@@ -1,0 +1,27 @@
+"""``clothsim plan``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from clothsim.scene import Scene
+from clothsim.simulation import Simulation
+
+__all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
+
+NAME = "plan"
+HELP = "Say which effects a scene runs and why, and what they take, without running it."
+EXAMPLE = "clothsim plan examples/drape.toml"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The scene."""
+    parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Print the plan."""
+    plan = Simulation(Scene.load(options.scene), allow_intersections=True).plan
+    print(json.dumps(plan) if options.json else str(plan).rstrip())
+    return 0

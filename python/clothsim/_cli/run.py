@@ -1,0 +1,93 @@
+"""``clothsim run``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from clothsim._device import check_device, check_threads
+from clothsim._run.job import Job, Stopped
+from clothsim.scene import Scene
+
+__all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
+
+NAME = "run"
+HELP = "Simulate a scene and write what its [output] asks for: frames, USD, pictures, plots, a report."
+EXAMPLE = "clothsim run examples/drape.toml -o out/drape --threads 2"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Scene, output folder, and how to run."""
+    parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    parser.add_argument("-o", "--out", metavar="OUT", required=True, type=Path, help="output folder")
+    parser.add_argument(
+        "--threads", metavar="N", type=_count, help="how many threads (default: all); results do not depend on it"
+    )
+    parser.add_argument("--device", default="auto", help="where to detect collisions: cpu or auto (default)")
+    parser.add_argument("--frames", metavar="N", type=_count, help="stop after N frames (default: the whole duration)")
+    mode = parser.add_mutually_exclusive_group()
+    mode.add_argument("--resume", action="store_true", help="go on with an unfinished run in OUT")
+    mode.add_argument("--overwrite", action="store_true", help="replace a run that OUT holds")
+    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def _count(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number ≥ 1, got {text!r}")
+    return value
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Run the job and say what came of it."""
+    check_device(options.device)
+    job = Job(
+        Scene.load(options.scene),
+        options.out,
+        threads=check_threads(options.threads),
+        device=options.device,
+        frames=options.frames,
+        resume=options.resume,
+        overwrite=options.overwrite,
+        progress=not (options.quiet or options.json),
+    )
+    try:
+        report = job.run()
+    except Stopped as stop:
+        again = f"clothsim run {options.scene} -o {options.out} --resume"
+        if options.json:
+            print(json.dumps({"stopped": str(stop), "frames": stop.frames, "of": stop.total, "resume": again}))
+        print(
+            f"clothsim: {stop} at {stop.seconds:.3f} s, {stop.frames} of {stop.total} frames; to go on:\n  {again}",
+            file=sys.stderr,
+        )
+        return 128 + stop.signum
+    if options.json:
+        print(json.dumps({"out": str(options.out), **report}))
+    else:
+        print(_summary(report, options.out))
+    return 0
+
+
+def _summary(report: dict[str, Any], out: Path) -> str:
+    simulated, wall = report["simulated_seconds"], report["wall_seconds"]
+    lines = [f"{report['scene']}: {report['frame_count']} frames, {simulated:g} s simulated in {wall:.1f} s"]
+    if "resumed" in report:
+        lines[0] += " (complete already: nothing to do)"
+    if report["max_intersections"] is not None:
+        lines.append(f"  intersecting pairs of triangles at most: {report['max_intersections']}")
+    if report["totals"]["not_converged"]:
+        lines.append(f"  steps that met a cap before their tolerance: {report['totals']['not_converged']}")
+    for name in report["outputs"]:
+        path = out / name
+        if path.is_dir():
+            lines.append(f"  {path}/  {sum(1 for _ in path.iterdir())} files")
+        elif path.exists():
+            lines.append(f"  {path}  {path.stat().st_size / 1e6:.1f} MB")
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""The main job: a scene simulated into a folder, whole or resumable."""

@@ -1,0 +1,67 @@
+"""What is known about each frame: energy, counts and seconds of its steps."""
+
+from __future__ import annotations
+
+import json
+import time
+from typing import Any
+
+from clothsim.simulation import Simulation
+
+__all__ = ["FrameFacts"]
+
+
+class FrameFacts:
+    """Collects the steps between frames, through checkpoints."""
+
+    def __init__(self, simulation: Simulation, header: dict[str, Any]) -> None:
+        self._simulation = simulation
+        self._steps = int(header["steps"])
+        self._wall = float(header["wall_seconds"])
+        self._started = time.monotonic()
+
+    def wall_seconds(self) -> float:
+        """Wall-clock seconds spent so far, earlier sessions included."""
+        return self._wall + time.monotonic() - self._started
+
+    def header(self, frames: int, digest: str) -> dict[str, Any]:
+        """Header of a checkpoint that ``frames`` frames belong to."""
+        return {"frames": frames, "steps": self._steps, "wall_seconds": self.wall_seconds(), "digest": digest}
+
+    def next(self, frame: int) -> dict[str, Any]:
+        """Facts about the state now, and about the steps since the frame before."""
+        steps = json.loads(self._simulation._core.steps(self._steps))
+        self._steps += len(steps)
+        return {
+            "frame": frame,
+            "time": self._simulation.time,
+            "energy": self._simulation.energy,
+            "steps": len(steps),
+            "substeps": sum(step["substeps"] for step in steps),
+            "retries": sum(step["retries"] for step in steps),
+            "linear_iterations": sum(step["linear_iterations"] for step in steps),
+            "residual": max((step["residual"] for step in steps), default=0.0),
+            "converged": all(step["converged"] for step in steps),
+            "contact": _contact(steps),
+            "intersections": steps[-1]["intersections"] if steps else None,
+            "seconds": _seconds(steps),
+        }
+
+
+def _contact(steps: list[dict[str, Any]]) -> dict[str, Any] | None:
+    """Counts summed over steps; residual and exempt pairs at their largest."""
+    contacts = [step["contact"] for step in steps if step["contact"] is not None]
+    if not contacts:
+        return None
+    return {
+        key: max(c[key] for c in contacts) if key in ("residual", "exempt") else sum(c[key] for c in contacts)
+        for key in contacts[0]
+    }
+
+
+def _seconds(steps: list[dict[str, Any]]) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for step in steps:
+        for stage, seconds in step["seconds"]:
+            total[stage] = total.get(stage, 0.0) + seconds
+    return total

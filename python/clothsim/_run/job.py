@@ -1,0 +1,219 @@
+"""One run from scene to outputs."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from clothsim import _core
+from clothsim._device import check_device
+from clothsim._run.facts import FrameFacts
+from clothsim._run.folder import RunFolder, digest
+from clothsim._run.outputs import Outputs, check_packages
+from clothsim.errors import CheckpointError, OutputExists, SimulationDiverged, SimulationStuck, SolverFailed
+from clothsim.recording import FrameWriter, Recording
+from clothsim.scene import Scene
+from clothsim.simulation import Simulation, frame_lengths, moving_positions, progress_bar, standing_positions
+
+__all__ = ["Job", "Stopped"]
+
+
+class Stopped(Exception):
+    """The run was stopped by a signal, after a checkpoint."""
+
+    def __init__(self, signum: int, frames: int, total: int, seconds: float) -> None:
+        super().__init__(f"stopped by {signal.Signals(signum).name}")
+        self.signum = signum
+        self.frames = frames
+        self.total = total
+        self.seconds = seconds
+
+
+@dataclass
+class Job:
+    """What is asked for on the command line.
+
+    Attributes
+    ----------
+    scene : Scene
+        What to simulate.
+    out : Path
+        Output folder.
+    threads : int or None
+        How many threads.
+    device : str
+        Where to detect collisions.
+    frames : int or None
+        Stop after so many frames.
+    resume, overwrite : bool
+        What to do with a run that is there already.
+    progress : bool
+        Show a bar.
+    """
+
+    scene: Scene
+    out: Path
+    threads: int | None = None
+    device: str = "auto"
+    frames: int | None = None
+    resume: bool = False
+    overwrite: bool = False
+    progress: bool = True
+
+    def run(self) -> dict[str, Any]:
+        """Simulate and write what the scene's ``[output]`` asks for; return the report without its frames.
+
+        Raises
+        ------
+        Stopped
+            After a signal; ``resume`` goes on.
+        OutputExists
+            The folder holds a run, and neither ``resume`` nor ``overwrite`` is set.
+        """
+        check_device(self.device)
+        settings = self.scene.output
+        check_packages(settings)
+        folder = RunFolder(self.out)
+        complete = self._check_folder(folder)
+        if complete is not None:
+            return complete
+        simulation = None if folder.started else self._new_simulation()  # bad input leaves no folder behind
+        with folder.locked():
+            return self._run(folder, settings, simulation)
+
+    def _check_folder(self, folder: RunFolder) -> dict[str, Any] | None:
+        """Refuse a folder that is in use; return the report of a run that is complete and to be resumed."""
+        if folder.out.exists() and not folder.out.is_dir():
+            raise OutputExists(f"{self.out}: expected a folder, got a file")
+        if self.resume and not folder.started and (self.out / "report.json").exists():
+            report: dict[str, Any] = json.loads((self.out / "report.json").read_text())
+            report.pop("frames", None)
+            return {**report, "resumed": "complete already"}
+        if self.resume or self.overwrite:
+            return None
+        if folder.started:
+            raise OutputExists(
+                f"{self.out}: holds an unfinished run; --resume goes on with it, --overwrite starts anew"
+            )
+        if present := folder.present():
+            raise OutputExists(f"{self.out}: holds a run already ({', '.join(present)}); --overwrite replaces it")
+        return None
+
+    def _new_simulation(self) -> Simulation:
+        return Simulation(self.scene, self.threads, self.device)
+
+    def _run(self, folder: RunFolder, settings: dict[str, Any], simulation: Simulation | None) -> dict[str, Any]:
+        fingerprint = digest(self.scene)
+        if not self.resume:
+            folder.clear_work()
+        header, simulation = self._start(folder, fingerprint, simulation)
+        fps = float(settings["fps"])
+        lengths = frame_lengths(self.scene.duration, fps)
+        if self.frames is not None:
+            lengths = lengths[: self.frames]
+        bodies = simulation.bodies
+        standing = standing_positions(bodies, simulation.collider_positions)
+        moving_count = sum(b.vertex_count for b in bodies if not b.static)
+        every = round(float(settings["checkpoint_interval"]) * fps)
+        writer = FrameWriter(folder.work, moving_count, keep=header["frames"])
+        facts = FrameFacts(simulation, header)
+        bar = progress_bar(len(lengths) + 1, initial=writer.frames, enabled=self.progress, name=self.scene.name)
+        error: SimulationDiverged | SimulationStuck | SolverFailed | None = None
+
+        def checkpoint() -> None:
+            writer.sync()
+            folder.save_checkpoint(facts.header(writer.frames, fingerprint), simulation._core.checkpoint())
+
+        try:
+            with _Signals() as signals:
+                while writer.frames <= len(lengths):
+                    try:
+                        with signals.raising():
+                            if simulation._core.interrupted:
+                                simulation.finish_advance()
+                            elif writer.frames > 0:
+                                simulation.advance(lengths[writer.frames - 1])
+                    except KeyboardInterrupt:
+                        checkpoint()
+                        raise Stopped(signals.signum, writer.frames, len(lengths) + 1, simulation.time) from None
+                    except (SimulationDiverged, SimulationStuck, SolverFailed) as failure:
+                        error = failure
+                        break
+                    positions = moving_positions(bodies, simulation.positions, simulation.collider_positions)
+                    writer.append(positions, facts.next(writer.frames))
+                    bar.update()
+                    if every > 0 and writer.frames % every == 0:
+                        checkpoint()
+            checkpoint()
+            bar.close()
+            rows, lines = writer.rows(), writer.facts()
+            times = np.array([line["time"] for line in lines])
+            tables = json.loads(simulation._core.scene())
+            recording = Recording(bodies, times, rows, standing, fps=fps, up=tables["up"], name=tables["name"])
+            outputs = Outputs(self.out, settings, recording, lines, simulation, facts.wall_seconds(), error)
+            report = outputs.write(progress=self.progress)
+        finally:
+            bar.close()
+            writer.close()
+        folder.remove_work()
+        if error is not None:
+            raise error
+        return report
+
+    def _start(
+        self, folder: RunFolder, fingerprint: str, simulation: Simulation | None
+    ) -> tuple[dict[str, Any], Simulation]:
+        """Header of the checkpoint to go on from (or an empty one), and the simulation at its state."""
+        found = folder.load_checkpoint() if self.resume else None
+        if found is None:
+            return {"frames": 0, "steps": 0, "wall_seconds": 0.0}, simulation or self._new_simulation()
+        header, engine = found
+        if header.get("digest") != fingerprint:
+            raise CheckpointError(
+                f"{self.out}: the unfinished run is of another scene, or the scene or one of its meshes has changed; "
+                "--overwrite starts anew"
+            )
+        return header, Simulation._over(_core.Simulation.resume(engine, self.threads))
+
+
+class _Signals:
+    """Ctrl-C and SIGTERM raise only where the engine can stop between two steps; elsewhere they wait."""
+
+    def __init__(self) -> None:
+        self.signum = 0
+        self._inside = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> _Signals:
+        for signum in (signal.SIGINT, signal.SIGTERM):
+            with contextlib.suppress(ValueError):  # not the main thread: signals go elsewhere
+                self._before[signum] = signal.signal(signum, self._handle)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for signum, handler in self._before.items():
+            signal.signal(signum, handler)
+
+    def _handle(self, signum: int, _frame: FrameType | None) -> None:
+        self.signum = signum
+        if self._inside:
+            raise KeyboardInterrupt
+
+    @contextlib.contextmanager
+    def raising(self) -> Iterator[None]:
+        """Let signals raise here, one that came before included."""
+        self._inside = True
+        try:
+            if self.signum:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._inside = False

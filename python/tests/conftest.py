@@ -1,0 +1,84 @@
+"""Fixtures shared by all tests."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from clothsim._data import VARIABLE, data_folder
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# A small cloth that falls on a ball: half a second, all stages at work, a second or two to run.
+SCENE = """
+name = "test"
+duration = 0.5
+[time]
+dt = 0.005
+[contact]
+thickness = 0.006
+[[cloth]]
+name = "cloth"
+mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 17, ny = 17 }
+material = "cotton"
+position = [0.02, 0.42, 0.01]
+[[collider]]
+name = "ball"
+shape = { type = "sphere", radius = 0.4, tolerance = 0.02 }
+keyframes = [
+    { time = 0.0, rotation = { axis = [0, 1, 0], angle = 0.0 } },
+    { time = 0.5, rotation = { axis = [0, 1, 0], angle = 1.0 } },
+]
+[output]
+fps = 30
+usd = false
+film_strip = false
+plots = false
+checkpoint_interval = 0.1
+"""
+
+RunCli = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture
+def run_cli() -> RunCli:
+    """Run the command line in a process of its own."""
+
+    def run(*arguments: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            cli_command(*arguments),
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=240,
+            **options,  # type: ignore[call-overload]
+        )
+
+    return run
+
+
+def cli_command(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-m", "clothsim", *map(str, arguments)]
+
+
+@pytest.fixture(scope="session")
+def ccd_data() -> Path:
+    """The folder with the ground truth for collision detection."""
+    folder = data_folder()
+    if folder is None:
+        if os.environ.get("CLOTHSIM_REQUIRE_DATA"):
+            pytest.fail(f"no ground truth: set {VARIABLE}")
+        pytest.skip(f"no ground truth: neither ${VARIABLE} nor ../shared/data is there")
+    return folder / "ccd"
