@@ -3,7 +3,10 @@
 //! All three solve the same system: prescribed vertices are eliminated, A_ff x_f = b_f − A_fp x_p, and residuals are
 //! those of that system relative to its right-hand side.
 
+mod faer_cg;
+mod faer_llt;
 mod pcg;
+mod scalar;
 
 use crate::{
     assembly::{BlockMatrix, Pattern},
@@ -73,17 +76,24 @@ pub enum SolveError {
         /// What was met.
         value: f64,
     },
+    /// The factorisation does not fit in memory.
+    #[error("linear solver: expected the factorisation to fit in memory")]
+    OutOfMemory,
 }
 
 /// A solver with its work space, for one sparsity pattern.
 pub(crate) enum Solver {
     Pcg(pcg::Pcg),
+    FaerCg(Box<faer_cg::FaerCg>),
+    FaerLlt(Box<faer_llt::FaerLlt>),
 }
 
 impl Solver {
     pub(crate) fn new(method: SolverMethod, pattern: &Pattern) -> Self {
         match method {
-            _ => Self::Pcg(pcg::Pcg::new(pattern.rows)),
+            SolverMethod::Pcg => Self::Pcg(pcg::Pcg::new(pattern.rows)),
+            SolverMethod::FaerCg => Self::FaerCg(Box::new(faer_cg::FaerCg::new(pattern))),
+            SolverMethod::FaerLlt => Self::FaerLlt(Box::new(faer_llt::FaerLlt::new(pattern))),
         }
     }
 
@@ -91,6 +101,8 @@ impl Solver {
     pub(crate) fn bytes(&self) -> usize {
         match self {
             Self::Pcg(pcg) => pcg.bytes(),
+            Self::FaerCg(cg) => cg.bytes(),
+            Self::FaerLlt(llt) => llt.bytes(),
         }
     }
 
@@ -104,8 +116,11 @@ impl Solver {
         x: &mut [Vec3],
         params: &SolverParams,
     ) -> Result<SolveInfo, SolveError> {
+        let SolverParams { tolerance, max_iterations, .. } = *params;
         match self {
-            Self::Pcg(pcg) => pcg.solve(a, b, pinned, x, params.tolerance, params.max_iterations),
+            Self::Pcg(pcg) => pcg.solve(a, b, pinned, x, tolerance, max_iterations),
+            Self::FaerCg(cg) => cg.solve(a, b, pinned, x, tolerance, max_iterations),
+            Self::FaerLlt(llt) => llt.solve(a, b, pinned, x, tolerance),
         }
     }
 }
