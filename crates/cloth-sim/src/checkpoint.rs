@@ -24,9 +24,10 @@ impl Simulation {
         payload.u64(self.state.step);
         payload.points(&self.state.x);
         payload.points(&self.state.v);
-        let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0 });
+        let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
         payload.u64(pending.steps);
         payload.f64(pending.dt);
+        payload.f64(pending.end);
         payload.assets(&self.assets);
         payload.text(&serde_json::to_string(&self.report).unwrap_or_default());
 
@@ -57,7 +58,7 @@ impl Simulation {
         if x.len() != v.len() {
             return Err(invalid("as many velocities as positions", format!("{} and {}", v.len(), x.len())));
         }
-        let pending = Pending { steps: payload.u64()?, dt: payload.f64()? };
+        let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
         let assets = payload.assets()?;
         let report = payload.text()?;
         if !payload.0.is_empty() {

@@ -81,3 +81,49 @@ fn alarm(reason: &str, vertices: impl Iterator<Item = usize>) -> Result<(), Alar
     vertices.dedup();
     Err(Alarm { reason: reason.into(), vertices })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Assets, Scene};
+
+    fn guard() -> (Guard, Vec<Vec3>) {
+        let text = "duration = 1.0\n[[cloth]]\nname = \"a\"\n\
+            mesh = { generator = \"grid\", width = 1.0, height = 1.0, nx = 3, ny = 3 }\n\
+            material = { areal_density = 0.1, in_plane = { model = \"spring\", stiffness = 10.0 } }\n";
+        let scene = Scene::parse_toml(text, "test.toml").unwrap();
+        let bodies = Bodies::new(&scene, &Assets::default()).unwrap();
+        let x = bodies.cloth[0].x.clone();
+        (Guard::new(&bodies), x)
+    }
+
+    #[test]
+    fn what_is_not_finite_is_named() {
+        let (guard, x) = guard();
+        let v = vec![Vec3::zeros(); 9];
+        assert_eq!(guard.check(&x, &x, &v), Ok(()));
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let mut wrong = x.clone();
+            wrong[4].y = bad;
+            let alarm = guard.check(&x, &wrong, &v).unwrap_err();
+            assert_eq!((alarm.reason.as_str(), &alarm.vertices[..]), ("not finite", &[4][..]));
+            let mut wrong = v.clone();
+            wrong[7].z = bad;
+            assert_eq!(guard.check(&x, &x, &wrong).unwrap_err().vertices, [7]);
+        }
+    }
+
+    #[test]
+    fn what_runs_away_is_named() {
+        let (guard, x) = guard();
+        let v = vec![Vec3::zeros(); 9];
+        let far: Vec<Vec3> = x.iter().map(|p| p + Vec3::new(2000.0, 0.0, 0.0)).collect();
+        assert_eq!(guard.check(&x, &far, &v).unwrap_err().vertices.len(), 9);
+        let mut long = x.clone();
+        long[0] += Vec3::new(0.0, 60.0, 0.0);
+        let alarm = guard.check(&x, &long, &v).unwrap_err();
+        assert!(alarm.reason.contains("stretched") && alarm.vertices.contains(&0), "{alarm:?}");
+        long[0] = x[0] + Vec3::new(0.0, 40.0, 0.0);
+        assert_eq!(guard.check(&x, &long, &v), Ok(()), "below the limit");
+    }
+}

@@ -32,6 +32,8 @@ pub struct Advance {
 pub(crate) struct Pending {
     pub(crate) steps: u64,
     pub(crate) dt: f64,
+    /// Time after the last of them [s].
+    pub(crate) end: f64,
 }
 
 /// A scene being simulated.
@@ -51,6 +53,9 @@ pub struct Simulation {
     pub(crate) pending: Option<Pending>,
     pub(crate) plan: Plan,
     pub(crate) report: Report,
+    /// Steps (start time, size) that fail on purpose.
+    #[cfg(test)]
+    pub(crate) fail: fn(f64, f64) -> bool,
 }
 
 impl Simulation {
@@ -145,6 +150,8 @@ impl Simulation {
             pending: None,
             plan,
             report,
+            #[cfg(test)]
+            fail: |_, _| false,
         })
     }
 
@@ -153,7 +160,8 @@ impl Simulation {
     /// # Errors
     /// [`SimError::Diverged`], [`SimError::Stuck`]: the step failed at every size tried; the state is the last good one.
     pub fn step(&mut self) -> Result<(), SimError> {
-        self.step_by(self.scene.time.dt)
+        let dt = self.scene.time.dt;
+        self.step_to(self.state.time + dt, dt)
     }
 
     /// Advances by `seconds` in ⌈`seconds`/dt⌉ equal steps. `check` is asked before each; [`ControlFlow::Break`] stops,
@@ -176,7 +184,8 @@ impl Simulation {
             });
         }
         let steps = (seconds / self.scene.time.dt - ROUNDING).ceil().max(0.0);
-        self.pending = (steps > 0.0).then(|| Pending { steps: steps as u64, dt: seconds / steps });
+        let end = self.state.time + seconds;
+        self.pending = (steps > 0.0).then(|| Pending { steps: steps as u64, dt: seconds / steps, end });
         self.finish_advance(check)
     }
 
@@ -193,9 +202,10 @@ impl Simulation {
             if check().is_break() {
                 return Ok(Advance { steps, interrupted: true });
             }
-            self.step_by(pending.dt)?;
+            let end = if pending.steps == 1 { pending.end } else { self.state.time + pending.dt };
+            self.step_to(end, pending.dt)?;
             steps += 1;
-            self.pending = (pending.steps > 1).then(|| Pending { steps: pending.steps - 1, dt: pending.dt });
+            self.pending = (pending.steps > 1).then(|| Pending { steps: pending.steps - 1, ..pending });
         }
         Ok(Advance { steps, interrupted: false })
     }

@@ -10,8 +10,8 @@ use crate::report::add_seconds;
 use crate::scene::Contact;
 use crate::{Scene, SimError, Simulation, StepReport, Vec3};
 use cloth_collision::{Body, Bvh, CollisionMesh, Detector, detector, intersections};
-use cloth_core::Pins;
-use cloth_response::{FrictionRule, Responder, ResponseError, ResponseParams};
+use cloth_core::{Pins, StepError, StepInfo};
+use cloth_response::{FrictionRule, Responder, ResponseError, ResponseInfo, ResponseParams};
 use std::time::Instant;
 
 /// The state that a checkpoint holds.
@@ -152,18 +152,18 @@ enum Failure {
 }
 
 impl Simulation {
-    /// One step of `dt` [s], in sub-steps if need be.
-    pub(crate) fn step_by(&mut self, dt: f64) -> Result<(), SimError> {
+    /// One step of `dt` [s] that ends at `end` [s], in sub-steps if need be.
+    pub(crate) fn step_to(&mut self, end: f64, dt: f64) -> Result<(), SimError> {
         let started = Instant::now();
         let t0 = self.state.time;
-        let halvings = self.scene.time.max_halvings;
-        // Time within the step in units of dt/2^halvings, so that sub-steps end exactly at t0 + dt.
-        let whole = 1_u64 << halvings;
-        let at = |units: u64| if units == whole { t0 + dt } else { t0 + dt * (units as f64 / whole as f64) };
+        // Sub-steps are counted in units of dt/2^halvings, so that the last one ends exactly at `end`.
+        let whole = 1_u64 << self.scene.time.max_halvings;
+        let fraction = |units: u64| units as f64 / whole as f64;
         let mut report = StepReport { dt, converged: true, ..StepReport::default() };
         let (mut done, mut size) = (0, whole);
         while done < whole {
-            match self.attempt(at(done), at(done + size), &mut report) {
+            let t1 = if done + size == whole { end } else { t0 + dt * fraction(done + size) };
+            match self.attempt(t1, dt * fraction(size), &mut report) {
                 Ok(()) => {
                     done += size;
                     report.substeps += 1;
@@ -185,24 +185,56 @@ impl Simulation {
         report.step = self.state.step;
         report.time = self.state.time;
         if self.contact.as_ref().is_some_and(|c| c.allow) {
+            let clock = Instant::now();
             report.intersections = Some(self.intersections()?.len());
+            add_seconds(&mut report.seconds, "intersection count", clock.elapsed().as_secs_f64());
         }
         self.report.push(report, started.elapsed().as_secs_f64());
         Ok(())
     }
 
-    /// The motion from `t0` to `t1`: accepted and written, or given up without a trace.
-    fn attempt(&mut self, t0: f64, t1: f64, report: &mut StepReport) -> Result<(), Failure> {
-        let dt = t1 - t0;
+    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace.
+    fn attempt(&mut self, t1: f64, dt: f64, report: &mut StepReport) -> Result<(), Failure> {
+        #[cfg(test)]
+        if (self.fail)(self.state.time, dt) {
+            return Err(Failure::Alarm(Alarm { reason: "planted".into(), vertices: vec![0] }));
+        }
         let (mut x, mut v) = (self.state.x.clone(), self.state.v.clone());
 
         let clock = Instant::now();
         let (pin_x, pin_v) = self.prescribe(t1, dt, &mut x, &mut v);
         add_seconds(&mut report.seconds, "prescribed", clock.elapsed().as_secs_f64());
 
-        let pins = Pins { vertices: &self.pins.vertices, x_t1: &pin_x, v_t1: &pin_v };
-        let info = self.integrator.step(&mut x, &mut v, t0, dt, &pins).map_err(|error| match error {
-            cloth_core::StepError::Solver(error) => {
+        let dynamics = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
+        self.check(&x, &v, report)?;
+        if let Some(info) = self.response(dt, &mut x, &mut v, report)? {
+            self.check(&x, &v, report)?;
+            report.contact.get_or_insert_default().add(&info);
+        }
+
+        report.newton_iterations += dynamics.newton_iterations;
+        report.linear_iterations += dynamics.linear_iterations;
+        report.residual = report.residual.max(dynamics.residual);
+        report.converged &= dynamics.converged;
+        self.state.x = x;
+        self.state.v = v;
+        self.state.time = t1;
+        Ok(())
+    }
+
+    /// The end of the step without contact.
+    fn dynamics(
+        &mut self,
+        dt: f64,
+        x: &mut [Vec3],
+        v: &mut [Vec3],
+        pin_x: &[Vec3],
+        pin_v: &[Vec3],
+        report: &mut StepReport,
+    ) -> Result<StepInfo, Failure> {
+        let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
+        let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(|error| match error {
+            StepError::Solver(error) => {
                 Failure::Alarm(Alarm { reason: error.to_string(), vertices: Vec::new() })
             }
             other => Failure::Stop(stage("dynamics", &other)),
@@ -210,40 +242,36 @@ impl Simulation {
         for (name, seconds) in &info.seconds {
             add_seconds(&mut report.seconds, name, *seconds);
         }
-        self.check(&x, &v, report)?;
+        Ok(info)
+    }
 
-        if let Some(contact) = &mut self.contact {
-            let ContactStage { mesh, bvh, continuous, responder, .. } = contact;
-            let (x_t0, masses, pool) = (&self.state.x, &self.inv_mass, &self.pool);
-            let result = match continuous {
-                None => responder.respond(mesh, bvh, masses, x_t0, &mut x, &mut v, dt, pool),
-                Some(other) => {
-                    responder.respond_with(mesh, bvh, other.as_mut(), masses, x_t0, &mut x, &mut v, dt, pool)
-                }
-            };
-            let info = result.map_err(|error| match error {
-                ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
-                ResponseError::NotFinite { name, vertex } => Failure::Alarm(Alarm {
-                    reason: format!("{name} not finite"),
-                    vertices: vec![vertex as u32],
-                }),
-                other => Failure::Stop(stage("contact", &other)),
-            })?;
-            report.contact.get_or_insert_default().add(&info);
-            for (name, seconds) in &info.seconds {
-                add_seconds(&mut report.seconds, name, *seconds);
+    /// Makes the motion free of known collisions; `None` for a scene without contact.
+    fn response(
+        &mut self,
+        dt: f64,
+        x: &mut [Vec3],
+        v: &mut [Vec3],
+        report: &mut StepReport,
+    ) -> Result<Option<ResponseInfo>, Failure> {
+        let Some(ContactStage { mesh, bvh, continuous, responder, .. }) = &mut self.contact else {
+            return Ok(None);
+        };
+        let (x_t0, masses, pool) = (&self.state.x, &self.inv_mass, &self.pool);
+        let result = match continuous {
+            None => responder.respond(mesh, bvh, masses, x_t0, x, v, dt, pool),
+            Some(other) => responder.respond_with(mesh, bvh, other.as_mut(), masses, x_t0, x, v, dt, pool),
+        };
+        let info = result.map_err(|error| match error {
+            ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
+            ResponseError::NotFinite { name, vertex } => {
+                Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
             }
-            self.check(&x, &v, report)?;
+            other => Failure::Stop(stage("contact", &other)),
+        })?;
+        for (name, seconds) in &info.seconds {
+            add_seconds(&mut report.seconds, name, *seconds);
         }
-
-        report.newton_iterations += info.newton_iterations;
-        report.linear_iterations += info.linear_iterations;
-        report.residual = report.residual.max(info.residual);
-        report.converged &= info.converged;
-        self.state.x = x;
-        self.state.v = v;
-        self.state.time = t1;
-        Ok(())
+        Ok(Some(info))
     }
 
     /// Writes where colliders and pins are at `t1`, and the mean velocity of their way there.
@@ -271,5 +299,79 @@ impl Simulation {
         let result = self.guard.check(&self.state.x, x, v).map_err(Failure::Alarm);
         add_seconds(&mut report.seconds, "guard", clock.elapsed().as_secs_f64());
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Assets, Scene, SimError, Simulation, SimulationOptions};
+
+    const SCENE: &str = r#"
+duration = 1.0
+[time]
+dt = 0.01
+max_halvings = 3
+[[cloth]]
+name = "cloth"
+mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 6, ny = 6 }
+material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 50.0 } }
+pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = [0.0, 1.0, 0.0] }] }]
+"#;
+
+    fn simulation() -> Simulation {
+        let scene = Scene::parse_toml(SCENE, "test.toml").unwrap();
+        let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+        Simulation::new(&scene, Assets::default(), options).unwrap()
+    }
+
+    #[test]
+    fn a_retry_leaves_no_trace() {
+        let mut retried = simulation();
+        retried.fail = |time, dt| time < 0.005 && dt > 0.006;
+        retried.step().unwrap();
+        assert_eq!((retried.report.steps[0].retries, retried.report.steps[0].substeps), (1, 2));
+        let mut straight = simulation();
+        straight.step_to(0.005, 0.005).unwrap();
+        straight.step_to(0.01, 0.005).unwrap();
+        assert_eq!(retried.state.x, straight.state.x);
+        assert_eq!(retried.state.v, straight.state.v);
+        assert_eq!((retried.state.time, retried.state.step), (0.01, 1));
+        let mut whole = simulation();
+        whole.step().unwrap();
+        assert_ne!(retried.state.x, whole.state.x, "the comparison sees a difference");
+    }
+
+    #[test]
+    fn a_step_that_fails_at_every_size_keeps_the_last_good_state() {
+        let mut sim = simulation();
+        sim.step().unwrap();
+        let good = sim.state.clone();
+        sim.fail = |_, _| true;
+        let error = sim.step().unwrap_err();
+        assert_eq!(error, SimError::Diverged { time: 0.01, reason: "planted".into(), vertices: vec![0] });
+        assert_eq!(sim.state, good);
+        assert_eq!(sim.report.steps.len(), 1);
+        sim.fail = |_, _| false;
+        sim.step().unwrap();
+        let mut straight = simulation();
+        straight.step().unwrap();
+        straight.step().unwrap();
+        assert_eq!(sim.state, straight.state);
+    }
+
+    #[test]
+    fn sub_steps_that_succeed_before_one_that_fails_are_kept() {
+        let mut sim = simulation();
+        sim.fail = |time, dt| dt > 0.006 || time > 0.004;
+        let SimError::Diverged { time, .. } = sim.step().unwrap_err() else { panic!("diverged") };
+        assert_eq!(time, 0.005);
+        assert_eq!(sim.time(), 0.005);
+    }
+
+    #[test]
+    fn a_scene_without_contact_builds_none() {
+        let sim = simulation();
+        assert!(sim.contact.is_none());
+        assert!(sim.plan.running().all(|name| !name.contains("contact") && name != "friction"));
     }
 }
