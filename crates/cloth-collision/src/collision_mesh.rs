@@ -150,8 +150,17 @@ impl CollisionMesh {
         if !self.bodies_meet(a, b) {
             return false;
         }
-        !(self.has_attachments
-            && (first.iter().any(|&v| self.attached_to[v as usize] == b)
-                || second.iter().any(|&v| self.attached_to[v as usize] == a)))
+        !self.is_attached(first, second)
+    }
+
+    /// Whether a vertex of one feature is attached to the other's body.
+    #[inline]
+    pub(crate) fn is_attached(&self, first: &[u32], second: &[u32]) -> bool {
+        if !self.has_attachments {
+            return false;
+        }
+        let (a, b) = (self.vertex_body[first[0] as usize], self.vertex_body[second[0] as usize]);
+        first.iter().any(|&v| self.attached_to[v as usize] == b)
+            || second.iter().any(|&v| self.attached_to[v as usize] == a)
     }
 }

@@ -99,7 +99,8 @@ impl Detector for Bvh {
         let start = Instant::now();
         self.refit(mesh, query, pool);
         let fitted = Instant::now();
-        let (visits, counts) = self.traverse(mesh, pool, || Streaming::new(narrow::Narrow::new(mesh, query)));
+        let scene = narrow::Scene::new(mesh, query);
+        let (visits, counts) = self.traverse(mesh, pool, || Streaming::new(narrow::Narrow::new(&scene)));
         let traversed = Instant::now();
         let mut out = narrow::merge(visits.into_iter().map(|v| v.sink));
         out.stats.broad_phase_tests = counts.box_tests;

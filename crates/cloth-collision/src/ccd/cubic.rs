@@ -1,6 +1,7 @@
 //! The coplanarity cubic in Bernstein form, with an error bound.
 
-use super::ROUNDING;
+use super::filter::determinant;
+use super::lanes::Vector;
 use crate::Vec3;
 
 /// Σ b_i C(3,i) t^i (1−t)^(3−i) on \[0, 1\], known to ± `error` there.
@@ -18,32 +19,10 @@ const ROOT_STEP: f64 = 1e-10;
 
 impl Cubic {
     /// det(x, y, z) of three vectors that move linearly from `[0]` to `[1]`.
-    ///
-    /// Error, with u = 2⁻⁵³ and M the product of the largest coordinates, first order in u: a determinant has six
-    /// products of size ≤ M; evaluation costs 28uM, the relative u of each entry 18uM; the mean of three
-    /// determinants for an inner coefficient 16uM more; a later restriction to a part of \[0, 1\] (three rounds of
-    /// interpolation between values ≤ 6M) 54uM, and the rounding of the time it starts at (slope ≤ 36M) 36uM.
-    /// Together 152uM < 6 [`ROUNDING`] M.
     #[inline]
     pub(crate) fn determinant(x: &[Vec3; 2], y: &[Vec3; 2], z: &[Vec3; 2]) -> Self {
-        let yz0 = y[0].cross(&z[0]);
-        let yz1 = y[1].cross(&z[1]);
-        // Mixed part of the product: y0×z1 + y1×z0.
-        let mixed = y[0].cross(&z[1]) + y[1].cross(&z[0]);
-        let b = [
-            x[0].dot(&yz0),
-            (x[0].dot(&mixed) + x[1].dot(&yz0)) / 3.0,
-            (x[1].dot(&mixed) + x[0].dot(&yz1)) / 3.0,
-            x[1].dot(&yz1),
-        ];
-        let size = |v: &[Vec3; 2]| v[0].amax().max(v[1].amax());
-        Self { b, error: 6.0 * ROUNDING * size(x) * size(y) * size(z) + f64::MIN_POSITIVE }
-    }
-
-    /// Whether the cubic is certainly without a root in \[0, 1\].
-    #[inline]
-    pub(crate) fn is_rootless(&self) -> bool {
-        self.b.iter().all(|&b| b > self.error) || self.b.iter().all(|&b| b < -self.error)
+        let (b, error) = determinant(x.map(Vector::from), y.map(Vector::from), z.map(Vector::from));
+        Self { b, error }
     }
 
     /// A time that is not later than the first root in \[t, 1\]; None if there is certainly no root.

@@ -1,7 +1,8 @@
 //! Conservative continuous collision detection of one pair.
 //!
-//! Every vertex moves linearly. All arithmetic is on differences of coordinates (each exact to a relative 2⁻⁵³, so a
-//! far origin costs nothing), scaled by a power of two. Two certified statements drive a march through the step:
+//! Every vertex moves linearly. All arithmetic is on differences of coordinates (each exact to a relative 2⁻⁵³, so a far
+//! origin costs nothing), scaled by a power of two. The [`filter`] rejects most pairs; through the step of the others
+//! a march is driven by two certified statements:
 //!
 //! * [`separation`]: along a fixed direction the signed gaps are linear in time; as long as all exceed their error
 //!   bound the pair is apart. This needs no general position: coplanar, parallel and degenerate motion included.
@@ -13,6 +14,8 @@
 
 mod cubic;
 mod edge_edge;
+pub(crate) mod filter;
+mod lanes;
 mod separation;
 mod vertex_triangle;
 
@@ -55,13 +58,33 @@ trait Motion<const K: usize> {
 /// later than the first time in \[0, 1\] at which the distance is ≤ `thickness` \[m\]; a pair that stays farther apart
 /// than about 1e-14 of its size at all times gets `None`. A coordinate that is not finite gives `Some(0)`.
 pub fn vertex_triangle_ccd(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
-    march(VertexTriangleMotion::new(p, thickness))
+    if is_finite(p) && filter::vertex_triangle_apart(&filter::points(p), thickness) {
+        return None;
+    }
+    vertex_triangle_march(p, thickness)
 }
 
 /// Time of the first contact of two edges.
 ///
 /// `p`: a0, a1, b0, b1 at t0, then at t1 \[m\]; each moves linearly. The answer is as in [`vertex_triangle_ccd`].
 pub fn edge_edge_ccd(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
+    if is_finite(p) && filter::edge_edge_apart(&filter::points(p), thickness) {
+        return None;
+    }
+    edge_edge_march(p, thickness)
+}
+
+fn is_finite(p: &[Vec3; 8]) -> bool {
+    p.iter().all(|p| p.x.is_finite() && p.y.is_finite() && p.z.is_finite())
+}
+
+/// [`vertex_triangle_ccd`] of a pair that the filter has not rejected.
+pub(crate) fn vertex_triangle_march(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
+    march(VertexTriangleMotion::new(p, thickness))
+}
+
+/// [`edge_edge_ccd`] of a pair that the filter has not rejected.
+pub(crate) fn edge_edge_march(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
     march(EdgeEdgeMotion::new(p, thickness))
 }
 
@@ -86,9 +109,6 @@ fn march<const K: usize>(mut motion: impl Motion<K>) -> Option<f64> {
     let relative = motion.relative();
     let thin = relative.thickness == 0.0;
     let cubic = motion.cubic();
-    if thin && cubic.is_rootless() {
-        return None;
-    }
     let mut t = 0.0;
     for _ in 0..MAX_STEPS {
         if thin {

@@ -69,16 +69,17 @@ impl<const K: usize> Relative<K> {
     }
 
     /// Whether a coordinate axis separates the sets during the whole step.
+    ///
+    /// Along an axis the only error is that of the differences, which is relative: their signs are exact, and this
+    /// decides pairs that the error bounds of other directions cannot. The thickness is widened by two roundings.
     #[inline]
     pub(crate) fn separated_by_axis(&self) -> bool {
-        // Along an axis the only error is that of the differences themselves, relative: signs are exact. The
-        // thickness is subtracted with one rounding.
         let threshold = self.thickness * (1.0 + 4.0 * f64::EPSILON);
         (0..3).any(|axis| {
-            let all = |sign: f64| {
-                (0..K).all(|k| sign * self.d0[k][axis] > threshold && sign * self.d1[k][axis] > threshold)
-            };
-            all(1.0) || all(-1.0)
+            let above = |d: &Vec3| d[axis] > threshold;
+            let below = |d: &Vec3| d[axis] < -threshold;
+            (self.d0.iter().all(above) && self.d1.iter().all(above))
+                || (self.d0.iter().all(below) && self.d1.iter().all(below))
         })
     }
 }

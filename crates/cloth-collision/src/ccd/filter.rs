@@ -1,0 +1,171 @@
+//! Rejects, with derived error bounds, pairs that certainly stay apart: many at once, without branches.
+//!
+//! Two questions. Are the four points never coplanar (the Bernstein coefficients of the cubic all have one sign)? Does one
+//! fixed direction separate the features during the whole step? The direction comes from Gilbert's algorithm for
+//! the point nearest to the origin in the hull of the differences at both ends of the step.
+//!
+//! Source: E. G. Gilbert, "An Iterative Procedure for Computing the Minimum of a Quadratic Form on a Convex Set", 1966.
+
+use super::ROUNDING;
+use super::lanes::{Lanes, Vector};
+use crate::Vec3;
+
+/// Iterations of Gilbert's algorithm, by measurement: more cost more than the exact searches they save.
+const DIRECTIONS: usize = 5;
+
+/// Eight points (four at t0, the same four at t1) of as many pairs as there are lanes.
+pub(crate) type Points<L> = [Vector<L>; 8];
+
+/// Bernstein coefficients on \[0, 1\] of det(x, y, z) of three vectors that move linearly from `[0]` to `[1]`, and an
+/// error bound for the polynomial and its restrictions to a part of \[0, 1\].
+///
+/// Error, with u = 2⁻⁵³ and M the product of the largest coordinates, first order in u: a determinant has six products
+/// of size ≤ M; evaluation costs 28uM, the relative u of each entry 18uM; the mean of three determinants for an inner
+/// coefficient 16uM more; a restriction (three rounds of interpolation between values ≤ 6M) 54uM, and the rounding of
+/// the time it starts at (slope ≤ 36M) 36uM. Together 152uM < 6 [`ROUNDING`] M. A product that overflows gives an
+/// infinite bound.
+#[inline(always)]
+pub(crate) fn determinant<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Vector<L>; 2]) -> ([L; 4], L) {
+    let yz0 = y[0].cross(z[0]);
+    let yz1 = y[1].cross(z[1]);
+    // Mixed part of the product: y0×z1 + y1×z0.
+    let mixed = y[0].cross(z[1]) + y[1].cross(z[0]);
+    let third = L::splat(1.0 / 3.0);
+    let b = [
+        x[0].dot(yz0),
+        (x[0].dot(mixed) + x[1].dot(yz0)) * third,
+        (x[1].dot(mixed) + x[0].dot(yz1)) * third,
+        x[1].dot(yz1),
+    ];
+    let size = x[0].largest().max(x[1].largest())
+        * y[0].largest().max(y[1].largest())
+        * z[0].largest().max(z[1].largest());
+    // 64 M overflows before a coefficient (≤ 6M) does.
+    let error = size * L::splat(64.0) * L::splat(6.0 / 64.0 * ROUNDING) + L::splat(f64::MIN_POSITIVE);
+    (b, error)
+}
+
+/// Where the vertex certainly stays farther than `thickness` from the triangle during the step.
+#[inline(always)]
+pub(crate) fn vertex_triangle_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
+    let d = [p[1] - p[0], p[2] - p[0], p[3] - p[0], p[5] - p[4], p[6] - p[4], p[7] - p[4]];
+    let apart = separated(&d, thickness);
+    if thickness > 0.0 {
+        return apart;
+    }
+    apart | rootless(determinant([d[0], d[3]], [d[1], d[4]], [d[2], d[5]]))
+}
+
+/// Where the edges certainly stay farther than `thickness` apart during the step.
+#[inline(always)]
+pub(crate) fn edge_edge_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
+    let d = [
+        p[0] - p[2],
+        p[0] - p[3],
+        p[1] - p[2],
+        p[1] - p[3],
+        p[4] - p[6],
+        p[4] - p[7],
+        p[5] - p[6],
+        p[5] - p[7],
+    ];
+    let apart = separated(&d, thickness);
+    if thickness > 0.0 {
+        return apart;
+    }
+    apart | rootless(determinant([d[0], d[4]], [p[1] - p[0], p[5] - p[4]], [p[3] - p[2], p[7] - p[6]]))
+}
+
+#[inline(always)]
+fn rootless<L: Lanes>((b, error): ([L; 4], L)) -> L::Mask {
+    let below = L::splat(0.0) - error;
+    let lowest = b[0].min(b[1]).min(b[2]).min(b[3]);
+    let highest = b[0].max(b[1]).max(b[2]).max(b[3]);
+    // A coefficient that is not a number is lost in the minimum only beside an infinite error bound.
+    lowest.greater(error) | below.greater(highest)
+}
+
+/// Where a direction is found along which all differences lie beyond the thickness, at both ends and so in between.
+///
+/// With g = n·d and u = 2⁻⁵³: differences carry u per coordinate, the dot product 3u, |n| 4u and its product with the
+/// thickness u: in all less than [`ROUNDING`] (|n|₁ max|d| + thickness |n|).
+#[inline(always)]
+fn separated<L: Lanes, const N: usize>(d: &[Vector<L>; N], thickness: f64) -> L::Mask {
+    let mut extent = d[0].largest();
+    let mut sum = d[0];
+    for k in 1..N {
+        extent = extent.max(d[k].largest());
+        sum = sum + d[k];
+    }
+    let mut n = sum.scale(L::splat(1.0 / N as f64));
+    let zero = L::splat(0.0);
+    let mut apart = zero.greater(zero);
+    for step in 0..DIRECTIONS {
+        let (mut lowest, mut corner) = (n.dot(d[0]), d[0]);
+        for k in 1..N {
+            let g = n.dot(d[k]);
+            let lower = lowest.greater(g);
+            corner = Vector::select(lower, d[k], corner);
+            lowest = L::select(lower, g, lowest);
+        }
+        let mut size = n.sum_of_sizes() * extent;
+        let mut needed = L::splat(f64::MIN_POSITIVE);
+        if thickness > 0.0 {
+            let offset = n.dot(n).sqrt() * L::splat(thickness);
+            size = size + offset;
+            needed = needed + offset;
+        }
+        apart = apart | lowest.greater(needed + size * L::splat(ROUNDING));
+        if step + 1 < DIRECTIONS {
+            // Nearest point to the origin on the segment from n to the corner.
+            let back = n - corner;
+            let along = (n.dot(back) / back.dot(back)).max(zero).min(L::splat(1.0));
+            n = n - back.scale(along);
+        }
+    }
+    apart
+}
+
+/// Four pairs at once: `coordinates[3 i + axis][lane]` of the eight points; bit per lane: certainly apart.
+pub(crate) type Group = [[f64; 4]; 24];
+
+macro_rules! four_at_once {
+    ($name:ident, $avx:ident, $one:ident) => {
+        /// Bit per lane: the pair is certainly apart.
+        #[inline]
+        pub(crate) fn $name(group: &Group, thickness: f64) -> u32 {
+            #[cfg(target_arch = "x86_64")]
+            if std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has AVX2.
+                return unsafe { $avx(group, thickness) };
+            }
+            let mut bits = 0;
+            for lane in 0..4 {
+                let points =
+                    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| Vector([0, 1, 2].map(|k| group[3 * i + k][lane])));
+                bits |= u32::from($one(&points, thickness)) << lane;
+            }
+            bits
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn $avx(group: &Group, thickness: f64) -> u32 {
+            use super::lanes::avx::Four;
+            // SAFETY: this function runs only where the processor has AVX2.
+            let load = |k: usize| unsafe { Four::load(&group[k]) };
+            let mut points = [Vector([Four::splat(0.0); 3]); 8];
+            for (i, point) in points.iter_mut().enumerate() {
+                *point = Vector([load(3 * i), load(3 * i + 1), load(3 * i + 2)]);
+            }
+            $one(&points, thickness).bits()
+        }
+    };
+}
+four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, vertex_triangle_apart);
+four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart);
+
+/// One pair.
+pub(crate) fn points(p: &[Vec3; 8]) -> Points<f64> {
+    p.map(Vector::from)
+}
