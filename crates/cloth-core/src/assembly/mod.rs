@@ -8,6 +8,7 @@ mod block_csr;
 mod elements;
 mod gather;
 mod pattern;
+pub(crate) mod simd;
 
 pub(crate) use block_csr::{BlockMatrix, Lanes};
 pub(crate) use elements::{Corners, ElementBuffers};

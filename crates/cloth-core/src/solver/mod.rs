@@ -3,10 +3,13 @@
 //! All three solve the same system: prescribed vertices are eliminated, A_ff x_f = b_f − A_fp x_p, and residuals are
 //! those of that system relative to its right-hand side.
 
+mod coarse;
 mod faer_cg;
 mod faer_llt;
+mod ordering;
 mod pcg;
 mod scalar;
+mod swept;
 
 use crate::{
     assembly::{BlockMatrix, Pattern},
@@ -19,9 +22,11 @@ use crate::{
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum SolverMethod {
-    /// Preconditioned conjugate gradient on 3×3 blocks.
+    /// Preconditioned conjugate gradient on 3×3 blocks: block-Jacobi scaling, symmetric sweeps and a coarse correction.
     #[default]
     Pcg,
+    /// The same with block-Jacobi alone.
+    PcgJacobi,
     /// faer's conjugate gradient on the same matrix.
     FaerCg,
     /// faer's sparse Cholesky factorisation, analysed once.
@@ -83,7 +88,8 @@ pub enum SolveError {
 
 /// A solver with its work space, for one sparsity pattern.
 pub(crate) enum Solver {
-    Pcg(pcg::Pcg),
+    Swept(Box<swept::Swept>),
+    Jacobi(Box<pcg::Pcg>),
     FaerCg(Box<faer_cg::FaerCg>),
     FaerLlt(Box<faer_llt::FaerLlt>),
 }
@@ -91,7 +97,8 @@ pub(crate) enum Solver {
 impl Solver {
     pub(crate) fn new(method: SolverMethod, pattern: &Pattern) -> Self {
         match method {
-            SolverMethod::Pcg => Self::Pcg(pcg::Pcg::new(pattern.rows)),
+            SolverMethod::Pcg => Self::Swept(Box::new(swept::Swept::new(pattern))),
+            SolverMethod::PcgJacobi => Self::Jacobi(Box::new(pcg::Pcg::new(pattern.rows))),
             SolverMethod::FaerCg => Self::FaerCg(Box::new(faer_cg::FaerCg::new(pattern))),
             SolverMethod::FaerLlt => Self::FaerLlt(Box::new(faer_llt::FaerLlt::new(pattern))),
         }
@@ -100,7 +107,8 @@ impl Solver {
     /// Memory of its work space [B].
     pub(crate) fn bytes(&self) -> usize {
         match self {
-            Self::Pcg(pcg) => pcg.bytes(),
+            Self::Swept(pcg) => pcg.bytes(),
+            Self::Jacobi(pcg) => pcg.bytes(),
             Self::FaerCg(cg) => cg.bytes(),
             Self::FaerLlt(llt) => llt.bytes(),
         }
@@ -118,7 +126,8 @@ impl Solver {
     ) -> Result<SolveInfo, SolveError> {
         let SolverParams { tolerance, max_iterations, .. } = *params;
         match self {
-            Self::Pcg(pcg) => pcg.solve(a, b, pinned, x, tolerance, max_iterations),
+            Self::Swept(pcg) => pcg.solve(a, b, pinned, x, tolerance, max_iterations),
+            Self::Jacobi(pcg) => pcg.solve(a, b, pinned, x, tolerance, max_iterations),
             Self::FaerCg(cg) => cg.solve(a, b, pinned, x, tolerance, max_iterations),
             Self::FaerLlt(llt) => llt.solve(a, b, pinned, x, tolerance),
         }
