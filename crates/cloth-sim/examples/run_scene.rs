@@ -29,10 +29,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let contact = sim.report().steps.last().and_then(|s| s.contact.clone()).unwrap_or_default();
             let fastest = sim.velocities().iter().map(|v| v.norm()).fold(0.0, f64::max);
             println!(
-                "t {:.2} s  energy {:9.4} J  fastest {fastest:6.3} m/s  pcg {:5}  near {:6}  passes {}  impulses {:5}  \
+                "t {:.2} s  energy {:9.4} J ({}) fastest {fastest:6.3} m/s  pcg {:5}  near {:6}  passes {}  impulses {:5}  \
                  zones {:3}  held {:4}  retries {}  intersections {pairs}  wall {:.1} s",
                 sim.time(),
                 sim.energy().total(),
+                parts(&sim),
                 totals.linear_iterations - iterations,
                 contact.proximities,
                 contact.passes,
@@ -61,6 +62,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         std::fs::write(path, bytes)?;
     }
     Ok(())
+}
+
+fn parts(sim: &Simulation) -> String {
+    let e = sim.energy();
+    format!(
+        "kin {:.3} str {:.3} shr {:.3} bend {:.4} grav {:.3}",
+        e.kinetic, e.stretch, e.shear, e.bending, e.gravity
+    )
 }
 
 /// User and system time of this process [s]; 0 where the system does not tell.
