@@ -239,7 +239,7 @@ def _write_member(
     with archive.open(info, "w", force_zip64=True) as member:
         if isinstance(array, np.ndarray):
             buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.ascontiguousarray(array), allow_pickle=False)
+            np.lib.format.write_array(buffer, np.asarray(array, order="C"), allow_pickle=False)
             member.write(buffer.getvalue())
             return
         header = {"descr": "<f8", "fortran_order": False, "shape": array}

@@ -57,7 +57,7 @@ def run_cli() -> RunCli:
     """Run the command line in a process of its own."""
 
     def run(*arguments: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
+        done: subprocess.CompletedProcess[str] = subprocess.run(
             cli_command(*arguments),
             capture_output=True,
             text=True,
@@ -65,6 +65,7 @@ def run_cli() -> RunCli:
             timeout=240,
             **options,  # type: ignore[call-overload]
         )
+        return done
 
     return run
 

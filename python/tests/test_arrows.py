@@ -32,7 +32,11 @@ def packages() -> list[dict[str, Any]]:
     if shutil.which("cargo") is None:
         pytest.skip("cargo is not on the PATH")
     out = subprocess.run(
-        ["cargo", "metadata", "--no-deps", "--format-version", "1"], cwd=ROOT, check=True, capture_output=True, text=True
+        ["cargo", "metadata", "--no-deps", "--format-version", "1"],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
     )
     found: list[dict[str, Any]] = json.loads(out.stdout)["packages"]
     return found
@@ -44,9 +48,12 @@ def test_the_workspace_keeps_to_the_arrows(tool: ModuleType, packages: list[dict
 
 
 @pytest.mark.parametrize(
-    ("crate", "dependency"), [("cloth-mesh", "cloth-core"), ("cloth-py", "cloth-mesh"), ("cloth-sim", "pyo3"), ("cloth-sim", "faer")]
+    ("crate", "dependency"),
+    [("cloth-mesh", "cloth-core"), ("cloth-py", "cloth-mesh"), ("cloth-sim", "pyo3"), ("cloth-sim", "faer")],
 )
-def test_a_planted_arrow_is_found(tool: ModuleType, packages: list[dict[str, Any]], crate: str, dependency: str) -> None:
+def test_a_planted_arrow_is_found(
+    tool: ModuleType, packages: list[dict[str, Any]], crate: str, dependency: str
+) -> None:
     """Complain about an arrow that is added where it is not allowed."""
     planted = copy.deepcopy(packages)
     next(p for p in planted if p["name"] == crate)["dependencies"].append({"name": dependency, "kind": None})

@@ -93,12 +93,12 @@ def test_a_gpu_is_asked_for_in_vain() -> None:
         cs.collision.detect(x_t0, x_t1, triangles, device="gpu")
 
 
-STILL = [[0, 0, 0], [1, 0, 0], [0, 0, 1]]
+STILL = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 
 
 def test_single_queries() -> None:
-    through = [[0.2, 1, 0.2], *STILL, [0.2, -1, 0.2], *STILL]
-    beside = [[2, 1, 2], *STILL, [2, -1, 2], *STILL]
+    through = [[0.2, 1.0, 0.2], *STILL, [0.2, -1.0, 0.2], *STILL]
+    beside = [[2.0, 1.0, 2.0], *STILL, [2.0, -1.0, 2.0], *STILL]
     hit, time = cs.collision.vertex_triangle_ccd([through, beside])
     assert hit.tolist() == [True, False]
     assert 0.5 - 1e-6 < time[0] <= 0.5

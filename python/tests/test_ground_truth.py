@@ -30,7 +30,9 @@ def test_no_pair_is_missed_and_none_is_outside_the_lists(ccd_data: Path, scene: 
         assert ((time >= 0.0) & (time <= 1.0)).all()
 
 
-@pytest.mark.parametrize(("kind", "ccd"), [("vf", cs.collision.vertex_triangle_ccd), ("ee", cs.collision.edge_edge_ccd)])
+@pytest.mark.parametrize(
+    ("kind", "ccd"), [("vf", cs.collision.vertex_triangle_ccd), ("ee", cs.collision.edge_edge_ccd)]
+)
 def test_single_queries(ccd_data: Path, kind: str, ccd: object) -> None:
     z = np.load(ccd_data / "queries.npz")
     hit, time = ccd(z[kind])  # type: ignore[operator]

@@ -60,7 +60,8 @@ BAD: list[tuple[str, Any, Any, Any, type[Exception], str]] = [
     ("unsigned", CORNERS, FACES.astype(np.uint8), None, cs.InvalidInput, "triangles: .*uint8"),
     ("NaN", np.where(CORNERS == 1, np.nan, CORNERS), FACES, None, cs.InvalidInput,
      r"vertices: expected finite coordinates, got \(NaN, 0, 0\) at vertex 1"),
-    ("infinite", np.where(CORNERS == 1, np.inf, CORNERS), FACES, None, cs.InvalidInput, "vertices: .*inf.* at vertex 1"),
+    ("infinite", np.where(CORNERS == 1, np.inf, CORNERS), FACES, None, cs.InvalidInput,
+     "vertices: .*inf.* at vertex 1"),
     ("index too high", CORNERS, [[0, 1, 2], [0, 1, 4]], None, cs.InvalidInput,
      r"triangles: expected indices in 0\.\.4, got 4 in triangle 1"),
     ("negative index", CORNERS, [[0, 1, -1]], None, cs.InvalidInput, "triangles: .*-1 in triangle 0"),
@@ -68,12 +69,15 @@ BAD: list[tuple[str, Any, Any, Any, type[Exception], str]] = [
     ("repeated vertex", CORNERS, [[0, 1, 2], [1, 3, 3]], None, cs.MeshError, r"triangle 1 .*1, 3, 3"),
     ("unreferenced", CORNERS, [[0, 1, 2]], None, cs.MeshError, "every vertex in a triangle.*vertex 3"),
     ("empty", CORNERS, np.zeros((0, 3), dtype=int), None, cs.MeshError, "at least one triangle"),
-    ("shape of uv", CORNERS, FACES, np.zeros((3, 2)), cs.InvalidInput, r"uv: expected shape \(4, 2\) .*got shape \(3, 2\)"),
+    ("shape of uv", CORNERS, FACES, np.zeros((3, 2)), cs.InvalidInput,
+     r"uv: expected shape \(4, 2\) .*got shape \(3, 2\)"),
     ("uv not finite", CORNERS, FACES, np.full((4, 2), np.nan), cs.InvalidInput, "uv: expected finite"),
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("vertices", "triangles", "uv", "error", "message"), [b[1:] for b in BAD], ids=[b[0] for b in BAD])
+@pytest.mark.parametrize(
+    ("vertices", "triangles", "uv", "error", "message"), [b[1:] for b in BAD], ids=[b[0] for b in BAD]
+)
 def test_bad_meshes_are_refused(vertices: Any, triangles: Any, uv: Any, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message) as caught:
         cs.Mesh(vertices, triangles, uv)

@@ -15,9 +15,9 @@ trimesh = pytest.importorskip("trimesh", reason="the extra 'mesh' is not install
 
 # Two panels that share the edge (1, 2) and have their own UV there: a seam.
 SEAM = cs.Mesh(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0.25], [2, 1 / 3, -1e-17]],
+    [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.25], [2.0, 1 / 3, -1e-17]],
     [[0, 1, 2], [1, 3, 2]],
-    [[[0, 0], [1, 0], [1, 1]], [[5, 0], [6, 0], [5, 1.1]]],
+    [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[5.0, 0.0], [6.0, 0.0], [5.0, 1.1]]],
 )
 
 
@@ -91,7 +91,7 @@ def test_obj_of_other_programs(tmp_path: Path) -> None:
 
 
 def ply(fmt: str, faces: list[list[int]]) -> bytes:
-    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0.5], [2, 1, 0.25]]
+    corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.5], [2.0, 1.0, 0.25]]
     header = (
         f"ply\nformat {fmt} 1.0\ncomment made by a test\nelement vertex {len(corners)}\nproperty float x\n"
         "property float y\nproperty float z\nproperty uchar red\nproperty double s\nproperty double t\n"
@@ -131,7 +131,9 @@ def test_ply_of_all_three_kinds(tmp_path: Path, fmt: str, faces: list[list[int]]
 def test_stl_corners_become_one_vertex_again(tmp_path: Path, ascii_: bool) -> None:
     mesh = cs.Mesh.box((1.0, 2.0, 3.0), (2, 1, 1))
     soup = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
-    (tmp_path / "a.stl").write_bytes(soup.export(file_type="stl_ascii").encode() if ascii_ else soup.export(file_type="stl"))
+    (tmp_path / "a.stl").write_bytes(
+        soup.export(file_type="stl_ascii").encode() if ascii_ else soup.export(file_type="stl")
+    )
     loaded = cs.Mesh.load(tmp_path / "a.stl")
     assert len(loaded.vertices) == len(mesh.vertices)
     np.testing.assert_allclose(loaded.vertices[loaded.triangles], mesh.vertices[mesh.triangles], atol=1e-6)
@@ -163,7 +165,9 @@ def test_a_concave_polygon_is_cut_inside() -> None:
     assert cut == {frozenset({0, 1, 2}), frozenset({0, 2, 3})}
     turned = np.roll(dart, 1, axis=0)  # a fan from its first corner would leave the polygon
     assert {frozenset(t) for t in triangulate(turned)} == {frozenset({1, 2, 3}), frozenset({1, 3, 0})}
-    star = np.array([[np.cos(a) * r, 0, -np.sin(a) * r] for a, r in zip(np.arange(10) * np.pi / 5, [1, 0.4] * 5, strict=True)])
+    star = np.array(
+        [[np.cos(a) * r, 0, -np.sin(a) * r] for a, r in zip(np.arange(10) * np.pi / 5, [1, 0.4] * 5, strict=True)]
+    )
     area = sum(0.5 * np.linalg.norm(np.cross(star[b] - star[a], star[c] - star[a])) for a, b, c in triangulate(star))
     assert area == pytest.approx(5 * 0.4 * np.sin(np.pi / 5))
     # Same side as the polygon.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
+from clothsim.errors import IntersectingStart
 from clothsim.scene import Scene
 from clothsim.simulation import Simulation
 
@@ -22,6 +23,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Print the plan."""
-    plan = Simulation(Scene.load(options.scene), allow_intersections=True).plan
+    scene = Scene.load(options.scene)
+    warning = ""
+    try:
+        plan = Simulation(scene).plan
+    except IntersectingStart as error:
+        plan = Simulation(scene, allow_intersections=True).plan
+        warning = str(error)
+        plan["warnings"] = [*plan["warnings"], warning]
     print(json.dumps(plan) if options.json else str(plan).rstrip())
+    if warning and not options.json:
+        print(f"warning: {warning}")
     return 0

@@ -78,7 +78,8 @@ def _contacts(axis: Any, times: Any, frames: list[dict[str, Any]]) -> None:
     }  # fmt: skip
     for key, (label, colour) in names.items():
         values = np.array([(frame["contact"] or {}).get(key, 0) / max(1, frame["steps"]) for frame in frames])
-        axis.plot(times, values, color=colour, linewidth=1.5, label=label)
+        shown = label if np.any(values) else f"{label}: none"
+        axis.plot(times, values, color=colour, linewidth=1.5, label=shown)
     if any(frame["intersections"] for frame in frames):
         values = np.array([frame["intersections"] or 0 for frame in frames])
         axis.plot(times, values, color=_INK, linewidth=1.5, label="intersecting triangles")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -116,57 +116,74 @@ class Job:
             folder.clear_work()
         header, simulation = self._start(folder, fingerprint, simulation)
         fps = float(settings["fps"])
-        lengths = frame_lengths(self.scene.duration, fps)
-        if self.frames is not None:
-            lengths = lengths[: self.frames]
+        lengths = frame_lengths(self.scene.duration, fps)[: self.frames]
         bodies = simulation.bodies
         standing = standing_positions(bodies, simulation.collider_positions)
-        moving_count = sum(b.vertex_count for b in bodies if not b.static)
         every = round(float(settings["checkpoint_interval"]) * fps)
-        writer = FrameWriter(folder.work, moving_count, keep=header["frames"])
+        writer = FrameWriter(folder.work, sum(b.vertex_count for b in bodies if not b.static), keep=header["frames"])
         facts = FrameFacts(simulation, header)
-        bar = progress_bar(len(lengths) + 1, initial=writer.frames, enabled=self.progress, name=self.scene.name)
-        error: SimulationDiverged | SimulationStuck | SolverFailed | None = None
 
         def checkpoint() -> None:
             writer.sync()
             folder.save_checkpoint(facts.header(writer.frames, fingerprint), simulation._core.checkpoint())
 
         try:
-            with _Signals() as signals:
-                while writer.frames <= len(lengths):
-                    try:
-                        with signals.raising():
-                            if simulation._core.interrupted:
-                                simulation.finish_advance()
-                            elif writer.frames > 0:
-                                simulation.advance(lengths[writer.frames - 1])
-                    except KeyboardInterrupt:
-                        checkpoint()
-                        raise Stopped(signals.signum, writer.frames, len(lengths) + 1, simulation.time) from None
-                    except (SimulationDiverged, SimulationStuck, SolverFailed) as failure:
-                        error = failure
-                        break
-                    positions = moving_positions(bodies, simulation.positions, simulation.collider_positions)
-                    writer.append(positions, facts.next(writer.frames))
-                    bar.update()
-                    if every > 0 and writer.frames % every == 0:
-                        checkpoint()
-            checkpoint()
-            bar.close()
-            rows, lines = writer.rows(), writer.facts()
+            error = self._simulate(simulation, lengths, writer, facts, checkpoint, every)
+            lines = writer.facts()
             times = np.array([line["time"] for line in lines])
-            tables = json.loads(simulation._core.scene())
-            recording = Recording(bodies, times, rows, standing, fps=fps, up=tables["up"], name=tables["name"])
+            scene = self.scene.to_dict()
+            recording = Recording(bodies, times, writer.rows(), standing, fps=fps, up=scene["up"], name=scene["name"])
             outputs = Outputs(self.out, settings, recording, lines, simulation, facts.wall_seconds(), error)
             report = outputs.write(progress=self.progress)
         finally:
-            bar.close()
             writer.close()
         folder.remove_work()
         if error is not None:
             raise error
         return report
+
+    def _simulate(
+        self,
+        simulation: Simulation,
+        lengths: list[float],
+        writer: FrameWriter,
+        facts: FrameFacts,
+        checkpoint: Callable[[], None],
+        every: int,
+    ) -> SimulationDiverged | SimulationStuck | SolverFailed | None:
+        """Go on to the last frame; return the error that stopped it before, if one did."""
+        core, bodies = simulation._core, simulation.bodies
+        bar = progress_bar(len(lengths) + 1, initial=writer.frames, enabled=self.progress, name=self.scene.name)
+        error: SimulationDiverged | SimulationStuck | SolverFailed | None = None
+        try:
+            with _Signals() as signals:
+                while writer.frames <= len(lengths):
+                    before, stopped = core.step_count, False
+                    try:
+                        with signals.raising():
+                            if core.interrupted:
+                                simulation.finish_advance()
+                            elif writer.frames > 0:
+                                simulation.advance(lengths[writer.frames - 1])
+                    except KeyboardInterrupt:
+                        stopped = True
+                    except (SimulationDiverged, SimulationStuck, SolverFailed) as failure:
+                        error = failure
+                        break
+                    # A signal during a frame's last step comes through after it: then the frame is complete.
+                    if not stopped or (core.step_count > before and not core.interrupted):
+                        positions = moving_positions(bodies, simulation.positions, simulation.collider_positions)
+                        writer.append(positions, facts.next(writer.frames))
+                        bar.update()
+                    if stopped:
+                        checkpoint()
+                        raise Stopped(signals.signum, writer.frames, len(lengths) + 1, simulation.time)
+                    if every > 0 and writer.frames % every == 0:
+                        checkpoint()
+            checkpoint()
+        finally:
+            bar.close()
+        return error
 
     def _start(
         self, folder: RunFolder, fingerprint: str, simulation: Simulation | None
