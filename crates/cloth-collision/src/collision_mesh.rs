@@ -131,10 +131,6 @@ impl CollisionMesh {
         self.admissible(&self.edges[a as usize], &self.edges[b as usize])
     }
 
-    pub(crate) fn triangles_admissible(&self, a: u32, b: u32) -> bool {
-        self.rules_allow(&self.triangles[a as usize], &self.triangles[b as usize])
-    }
-
     #[inline]
     fn admissible(&self, first: &[u32], second: &[u32]) -> bool {
         if first.iter().any(|v| second.contains(v)) {

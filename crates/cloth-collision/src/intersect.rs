@@ -1,4 +1,4 @@
-//! Triangles that pass through each other: exact predicates behind a floating-point filter.
+//! Triangles that pass through each other, decided exactly.
 
 use crate::{Bvh, CollisionMesh, DetectError, Vec3};
 use robust::{Coord, Coord3D, orient2d, orient3d};
@@ -37,88 +37,25 @@ pub fn intersections(
     Bvh::new(mesh, x)?.intersections(mesh, x, pool)
 }
 
-/// Whether the two triangles meet in the sense of [`intersections`].
+/// Whether two triangles without a common vertex meet: a side of one and the other have a common point.
 pub(crate) fn triangles_meet(first: [u32; 3], second: [u32; 3], x: &[Vec3]) -> bool {
-    let shared = first.iter().filter(|v| second.contains(v)).count();
-    if shared >= 2 {
-        return false;
-    }
-    sides_meet(first, second, shared, x) || sides_meet(second, first, shared, x)
+    let sides = |t: [u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+    sides(first).iter().any(|&side| side_meets(side, second, x))
+        || sides(second).iter().any(|&side| side_meets(side, first, x))
 }
 
-/// Whether a side of `first` that has no vertex in common with `second` meets it.
-fn sides_meet(first: [u32; 3], second: [u32; 3], shared: usize, x: &[Vec3]) -> bool {
-    let target = Target::new(second.map(|v| x[v as usize]));
-    let p = first.map(|v| x[v as usize]);
-    if shared == 0 {
-        let heights = p.map(|p| target.height(&p));
-        if target.all_on_one_side(&heights) {
-            return false;
-        }
-    }
-    (0..3).any(|k| {
-        let (i, j) = (k, (k + 1) % 3);
-        !(shared == 1 && (second.contains(&first[i]) || second.contains(&first[j])))
-            && target.meets(&p[i], &p[j])
-    })
+/// Whether a closed segment and a closed triangle have a common point.
+pub(crate) fn side_meets(side: [u32; 2], triangle: [u32; 3], x: &[Vec3]) -> bool {
+    let target = Target { corners: triangle.map(|v| x[v as usize]) };
+    target.meets(&x[side[0] as usize], &x[side[1] as usize])
 }
 
-/// A triangle prepared for tests against segments.
 struct Target {
     corners: [Vec3; 3],
-    sides: [Vec3; 3],
-    normal: Vec3,
 }
 
-/// Relative error bound of the filter's dot products, in units of |n|₁ max|d|: 2⁻⁵³ for each difference, 3·2⁻⁵³ for the
-/// dot product, and room for higher orders. The direction n itself is taken as it is: any direction may separate.
-const FILTER_ERROR: f64 = 8.0 * f64::EPSILON;
-
 impl Target {
-    fn new(corners: [Vec3; 3]) -> Self {
-        let [a, b, c] = corners;
-        let sides = [b - a, c - b, a - c];
-        Self { corners, sides, normal: sides[0].cross(&-sides[2]) }
-    }
-
-    /// Smallest and largest n·(p − corner), widened by their errors.
-    fn height(&self, p: &Vec3) -> [f64; 2] {
-        self.range(&self.normal, p)
-    }
-
-    fn range(&self, n: &Vec3, p: &Vec3) -> [f64; 2] {
-        let (mut lo, mut hi, mut size) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
-        for corner in &self.corners {
-            let d = p - corner;
-            let g = n.dot(&d);
-            lo = lo.min(g);
-            hi = hi.max(g);
-            size = size.max(d.amax());
-        }
-        let error = FILTER_ERROR * (n.x.abs() + n.y.abs() + n.z.abs()) * size + f64::MIN_POSITIVE;
-        [lo - error, hi + error]
-    }
-
-    fn all_on_one_side(&self, heights: &[[f64; 2]]) -> bool {
-        heights.iter().all(|h| h[0] > 0.0) || heights.iter().all(|h| h[1] < 0.0)
-    }
-
-    /// Whether the closed segment and the closed triangle have a common point.
     fn meets(&self, p: &Vec3, q: &Vec3) -> bool {
-        if self.all_on_one_side(&[self.height(p), self.height(q)]) {
-            return false;
-        }
-        for side in &self.sides {
-            // Points out of the triangle, in its plane: a segment beyond all corners along it is apart.
-            let outward = side.cross(&self.normal);
-            if self.range(&outward, p)[0] > 0.0 && self.range(&outward, q)[0] > 0.0 {
-                return false;
-            }
-        }
-        self.meets_exactly(p, q)
-    }
-
-    fn meets_exactly(&self, p: &Vec3, q: &Vec3) -> bool {
         let [a, b, c] = self.corners.map(coord3);
         let (p3, q3) = (coord3(*p), coord3(*q));
         let (above_p, above_q) = (orient3d(a, b, c, p3), orient3d(a, b, c, q3));

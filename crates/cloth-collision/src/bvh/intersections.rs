@@ -2,7 +2,8 @@
 
 use super::traverse::{LeafPairs, Visit};
 use super::{Bvh, leaf_pair};
-use crate::intersect::triangles_meet;
+use crate::ccd::filter::{filter, four_segment_triangles_apart, four_triangles_apart, put};
+use crate::intersect::{side_meets, triangles_meet};
 use crate::{CollisionMesh, DetectError, Mode, Query, Vec3};
 use cloth_mesh::NONE;
 
@@ -21,9 +22,18 @@ impl Bvh {
         query.check(mesh)?;
         self.check_mesh(mesh)?;
         self.refit(mesh, &query, pool);
-        let (visits, _) = self.traverse(mesh, pool, || Meetings { mesh, x, waiting: vec![], found: vec![] });
+        let (visits, _) = self.traverse(mesh, pool, || Meetings {
+            mesh,
+            x,
+            waiting: vec![],
+            strangers: vec![],
+            sides: vec![],
+            found: vec![],
+        });
         let mut found: Vec<[u32; 2]> = visits.into_iter().flat_map(|v| v.found).collect();
+        // Both sides of a pair with a common vertex may have met.
         found.sort_unstable();
+        found.dedup();
         Ok(found)
     }
 }
@@ -32,22 +42,98 @@ struct Meetings<'a> {
     mesh: &'a CollisionMesh,
     x: &'a [Vec3],
     waiting: Vec<[u32; 2]>,
+    /// Pairs of triangles without a common vertex.
+    strangers: Vec<[u32; 2]>,
+    /// A triangle's side opposite to the vertex that it shares with another triangle, and that other.
+    sides: Vec<Side>,
     found: Vec<[u32; 2]>,
+}
+
+struct Side {
+    pair: [u32; 2],
+    side: [u32; 2],
+    triangle: [u32; 3],
+}
+
+/// Pairs wait until there are so many.
+const FLUSH: usize = 1024;
+
+impl Meetings<'_> {
+    fn flush(&mut self) {
+        let Self { mesh, x, strangers, sides, found, .. } = self;
+        filter(
+            strangers,
+            |pair, lane, group| {
+                for (side, &t) in pair.iter().enumerate() {
+                    for (k, &v) in mesh.triangles[t as usize].iter().enumerate() {
+                        put(group, 3 * side + k, lane, &x[v as usize]);
+                    }
+                }
+            },
+            |group| four_triangles_apart(group, 0.0),
+            |&[s, t]| {
+                if triangles_meet(mesh.triangles[s as usize], mesh.triangles[t as usize], x) {
+                    found.push([s.min(t), s.max(t)]);
+                }
+            },
+        );
+        filter(
+            sides,
+            |item, lane, group| {
+                for (k, &v) in item.side.iter().chain(&item.triangle).enumerate() {
+                    put(group, k, lane, &x[v as usize]);
+                }
+            },
+            |group| four_segment_triangles_apart(group, 0.0),
+            |item| {
+                if side_meets(item.side, item.triangle, x) {
+                    found.push(item.pair);
+                }
+            },
+        );
+        strangers.clear();
+        sides.clear();
+    }
 }
 
 impl Visit for Meetings<'_> {
     fn leaf_pair(&mut self, leaves: &LeafPairs<'_>, a: u32, b: u32) {
         leaf_pair::triangles(leaves.tree, leaves.boxes, a, b, &mut self.waiting);
         for [s, t] in self.waiting.drain(..) {
-            if s == NONE || t == NONE || !self.mesh.triangles_admissible(s, t) {
+            // The traversal has seen to the bodies.
+            if s == NONE || t == NONE {
                 continue;
             }
             let (first, second) = (self.mesh.triangles[s as usize], self.mesh.triangles[t as usize]);
-            if triangles_meet(first, second, self.x) {
-                self.found.push([s.min(t), s.max(t)]);
+            if self.mesh.is_attached(&first, &second) {
+                continue;
             }
+            let pair = [s.min(t), s.max(t)];
+            let (mut shared, mut corners) = (0, (0, 0));
+            for i in 0..3 {
+                for j in 0..3 {
+                    if first[i] == second[j] {
+                        shared += 1;
+                        corners = (i, j);
+                    }
+                }
+            }
+            match shared {
+                0 => self.strangers.push(pair),
+                1 => {
+                    let opposite = |tri: [u32; 3], k: usize| [tri[(k + 1) % 3], tri[(k + 2) % 3]];
+                    self.sides.push(Side { pair, side: opposite(first, corners.0), triangle: second });
+                    self.sides.push(Side { pair, side: opposite(second, corners.1), triangle: first });
+                }
+                _ => {}
+            }
+        }
+        if self.strangers.len() + self.sides.len() > FLUSH {
+            self.flush();
         }
     }
 
-    fn finish(&mut self) {}
+    fn finish(&mut self) {
+        self.flush();
+    }
 }

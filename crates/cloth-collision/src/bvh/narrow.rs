@@ -1,7 +1,7 @@
 //! The narrow phase of a traversal: candidates in, contacts out.
 
 use super::traverse::{Candidates, Sink};
-use crate::ccd::filter::{Group, four_edge_edges_apart, four_vertex_triangles_apart};
+use crate::ccd::filter::{Group, filter, four_edge_edges_apart, four_vertex_triangles_apart, put};
 use crate::ccd::{edge_edge_march, vertex_triangle_march};
 use crate::{CollisionMesh, Contacts, Mode, Query, Vec3};
 use cloth_mesh::NONE;
@@ -33,13 +33,11 @@ impl<'a> Scene<'a> {
     }
 
     /// Writes the four vertices of a pair into its lane.
-    fn gather(&self, vertices: [u32; 4], lane: usize, group: &mut Group) {
+    fn gather(&self, vertices: [u32; 4], lane: usize, group: &mut Group<8>) {
         for (k, v) in vertices.into_iter().enumerate() {
             let [x0, x1] = &self.motion[v as usize];
-            for axis in 0..3 {
-                group[3 * k + axis][lane] = x0[axis];
-                group[3 * (k + 4) + axis][lane] = x1[axis];
-            }
+            put(group, k, lane, x0);
+            put(group, k + 4, lane, x1);
         }
     }
 }
@@ -71,31 +69,11 @@ impl<'a> Narrow<'a> {
     }
 }
 
-/// Calls `survivor` with each pair that the filter does not reject.
-fn filter(
-    scene: &Scene<'_>,
-    pairs: &[Pair],
-    apart: impl Fn(&Group, f64) -> u32,
-    mut survivor: impl FnMut(&Pair),
-) {
-    let mut group: Group = [[0.0; 4]; 24];
-    for four in pairs.chunks(4) {
-        for (lane, pair) in four.iter().enumerate() {
-            scene.gather(pair.1, lane, &mut group);
-        }
-        let apart = apart(&group, scene.query.thickness);
-        for (lane, pair) in four.iter().enumerate() {
-            if apart >> lane & 1 == 0 {
-                survivor(pair);
-            }
-        }
-    }
-}
-
 impl Sink for Narrow<'_> {
     fn take(&mut self, candidates: &mut Candidates) {
         let Self { scene, waiting, .. } = self;
         let (mesh, thickness) = (scene.mesh, scene.query.thickness);
+        let gather = |pair: &Pair, lane: usize, group: &mut Group<8>| scene.gather(pair.1, lane, group);
         let time = |t: f64| if scene.query.mode == Mode::Continuous { t } else { 1.0 };
 
         waiting.clear();
@@ -108,12 +86,17 @@ impl Sink for Narrow<'_> {
             }
         }
         self.candidates_vertex_triangle += waiting.len() as u64;
-        filter(scene, waiting, four_vertex_triangles_apart, |&(pair, vertices)| {
-            self.root_searches += 1;
-            if let Some(t) = vertex_triangle_march(&scene.points(vertices), thickness) {
-                self.vertex_triangle.push((pair, time(t)));
-            }
-        });
+        filter(
+            waiting,
+            gather,
+            |g| four_vertex_triangles_apart(g, thickness),
+            |&(pair, vertices)| {
+                self.root_searches += 1;
+                if let Some(t) = vertex_triangle_march(&scene.points(vertices), thickness) {
+                    self.vertex_triangle.push((pair, time(t)));
+                }
+            },
+        );
 
         waiting.clear();
         for [e, f] in candidates.edge_edge.drain(..) {
@@ -126,12 +109,17 @@ impl Sink for Narrow<'_> {
             }
         }
         self.candidates_edge_edge += waiting.len() as u64;
-        filter(scene, waiting, four_edge_edges_apart, |&(pair, vertices)| {
-            self.root_searches += 1;
-            if let Some(t) = edge_edge_march(&scene.points(vertices), thickness) {
-                self.edge_edge.push((pair, time(t)));
-            }
-        });
+        filter(
+            waiting,
+            gather,
+            |g| four_edge_edges_apart(g, thickness),
+            |&(pair, vertices)| {
+                self.root_searches += 1;
+                if let Some(t) = edge_edge_march(&scene.points(vertices), thickness) {
+                    self.edge_edge.push((pair, time(t)));
+                }
+            },
+        );
     }
 }
 

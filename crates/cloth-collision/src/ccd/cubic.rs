@@ -11,10 +11,12 @@ pub(crate) struct Cubic {
     pub(crate) error: f64,
 }
 
-/// Steps of Bézier clipping before the present bound is returned as it stands. Convergence at a simple root is
-/// quadratic (about 5 steps), at a double root it halves the distance (about 30 steps to [`ROOT_STEP`]).
+/// Steps of Bézier clipping before the present bound is returned as it stands.
 const MAX_CLIPS: usize = 64;
-/// A clip that moves on by less than this fraction of the step has arrived.
+/// Steps of Newton's method; five are usual.
+const MAX_NEWTON: usize = 16;
+/// A clip that moves on by less than this fraction of the step has arrived, and a root found by Newton's method is
+/// approached to it.
 const ROOT_STEP: f64 = 1e-10;
 
 impl Cubic {
@@ -27,20 +29,36 @@ impl Cubic {
 
     /// A time that is not later than the first root in \[t, 1\]; None if there is certainly no root.
     pub(crate) fn first_root_bound(&self, t: f64) -> Option<f64> {
+        let c = restrict(&self.b, t);
+        if !(c[0].abs() > self.error) {
+            return Some(t);
+        }
+        // The polynomial less its error bound: a true root cannot come before its first root.
+        let sign = c[0].signum();
+        let c = c.map(|value| value * sign - self.error);
+        if c.iter().all(|&v| v > 0.0) {
+            return None;
+        }
+        if let Some(x) = approach(&c) {
+            return Some(t + x * (1.0 - t));
+        }
+        self.clip(t)
+    }
+
+    /// [`Cubic::first_root_bound`] without luck: clips away what lies before the hull of the control points reaches
+    /// zero, again and again.
+    fn clip(&self, t: f64) -> Option<f64> {
         let mut t = t;
         for _ in 0..MAX_CLIPS {
-            let mut c = restrict(&self.b, t);
+            let c = restrict(&self.b, t);
             if !(c[0].abs() > self.error) {
                 return Some(t);
             }
             let sign = c[0].signum();
-            for value in &mut c {
-                *value = *value * sign - self.error;
-            }
+            let c = c.map(|value| value * sign - self.error);
             if c.iter().all(|&v| v > 0.0) {
                 return None;
             }
-            // The curve lies in the hull of the points (i/3, c_i): no root before the hull reaches zero.
             let mut first = 1.0f64;
             for i in 0..3 {
                 for j in i + 1..4 {
@@ -63,11 +81,59 @@ impl Cubic {
     }
 }
 
-/// Bernstein coefficients of the same polynomial on \[t, 1\] (de Casteljau).
+/// A parameter shortly before a root of the polynomial with coefficients `c`, c0 > 0 ≥ c3, up to which it certainly
+/// has none; None if this simple way does not find one.
+#[inline]
+fn approach(c: &[f64; 4]) -> Option<f64> {
+    if c[3] > 0.0 {
+        return None;
+    }
+    let slopes = [3.0 * (c[1] - c[0]), 3.0 * (c[2] - 2.0 * c[1] + c[0]), c[3] - 3.0 * (c[2] - c[1]) - c[0]];
+    let (mut lo, mut hi, mut x) = (0.0, 1.0, c[0] / (c[0] - c[3]));
+    for _ in 0..MAX_NEWTON {
+        let value = c[0] + x * (slopes[0] + x * (slopes[1] + x * slopes[2]));
+        let slope = slopes[0] + x * (2.0 * slopes[1] + x * 3.0 * slopes[2]);
+        if value > 0.0 {
+            lo = x;
+        } else {
+            hi = x;
+        }
+        let mut next = x - value / slope;
+        if !(next > lo && next < hi) {
+            next = 0.5 * (lo + hi);
+        }
+        let arrived = (next - x).abs() < 0.1 * ROOT_STEP;
+        x = next;
+        if arrived {
+            break;
+        }
+    }
+    let end = x - ROOT_STEP;
+    (end > 0.0 && is_positive(c, end)).then_some(end)
+}
+
+/// Whether the coefficients on \[0, x\] are positive, or those on both halves of it.
+#[inline]
+fn is_positive(c: &[f64; 4], x: f64) -> bool {
+    let [left, _] = split(c, x);
+    if left.iter().all(|&v| v > 0.0) {
+        return true;
+    }
+    split(&left, 0.5).iter().flatten().all(|&v| v > 0.0)
+}
+
+/// Bernstein coefficients on \[0, x\] and on \[x, 1\] (de Casteljau).
+#[inline]
+fn split(c: &[f64; 4], x: f64) -> [[f64; 4]; 2] {
+    let mix = |p: f64, q: f64| p * (1.0 - x) + q * x;
+    let (p, q, r) = (mix(c[0], c[1]), mix(c[1], c[2]), mix(c[2], c[3]));
+    let (pq, qr) = (mix(p, q), mix(q, r));
+    let pqr = mix(pq, qr);
+    [[c[0], p, pq, pqr], [pqr, qr, r, c[3]]]
+}
+
+/// Bernstein coefficients of the same polynomial on \[t, 1\].
 #[inline]
 fn restrict(b: &[f64; 4], t: f64) -> [f64; 4] {
-    let mix = |x: f64, y: f64| x * (1.0 - t) + y * t;
-    let (p, q, r) = (mix(b[0], b[1]), mix(b[1], b[2]), mix(b[2], b[3]));
-    let (pq, qr) = (mix(p, q), mix(q, r));
-    [mix(pq, qr), qr, r, b[3]]
+    if t == 0.0 { *b } else { split(b, t)[1] }
 }

@@ -21,8 +21,8 @@ pub(crate) type Points<L> = [Vector<L>; 8];
 ///
 /// Error, with u = 2⁻⁵³ and M the product of the largest coordinates, first order in u: a determinant has six products
 /// of size ≤ M; evaluation costs 28uM, the relative u of each entry 18uM; the mean of three determinants for an inner
-/// coefficient 16uM more; a restriction (three rounds of interpolation between values ≤ 6M) 54uM, and the rounding of
-/// the time it starts at (slope ≤ 36M) 36uM. Together 152uM < 6 [`ROUNDING`] M. A product that overflows gives an
+/// coefficient 16uM more; each of up to three restrictions in a row (three rounds of interpolation between values ≤ 6M)
+/// 54uM, and the rounding of a time (slope ≤ 36M), twice, 36uM. Together 296uM < 10 [`ROUNDING`] M. A product that overflows gives an
 /// infinite bound.
 #[inline(always)]
 pub(crate) fn determinant<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Vector<L>; 2]) -> ([L; 4], L) {
@@ -41,7 +41,7 @@ pub(crate) fn determinant<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Ve
         * y[0].largest().max(y[1].largest())
         * z[0].largest().max(z[1].largest());
     // 64 M overflows before a coefficient (≤ 6M) does.
-    let error = size * L::splat(64.0) * L::splat(6.0 / 64.0 * ROUNDING) + L::splat(f64::MIN_POSITIVE);
+    let error = size * L::splat(64.0) * L::splat(10.0 / 64.0 * ROUNDING) + L::splat(f64::MIN_POSITIVE);
     (b, error)
 }
 
@@ -126,14 +126,38 @@ fn separated<L: Lanes, const N: usize>(d: &[Vector<L>; N], thickness: f64) -> L:
     apart
 }
 
-/// Four pairs at once: `coordinates[3 i + axis][lane]` of the eight points; bit per lane: certainly apart.
-pub(crate) type Group = [[f64; 4]; 24];
+/// Where a segment (first two points) certainly has no point in common with a triangle (last three).
+#[inline(always)]
+fn segment_triangle_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
+    let d = [p[0] - p[2], p[0] - p[3], p[0] - p[4], p[1] - p[2], p[1] - p[3], p[1] - p[4]];
+    separated(&d, 0.0)
+}
+
+/// Where two triangles (three points each) certainly have no point in common.
+#[inline(always)]
+fn triangle_triangle_apart<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
+    let d = [
+        p[0] - p[3],
+        p[0] - p[4],
+        p[0] - p[5],
+        p[1] - p[3],
+        p[1] - p[4],
+        p[1] - p[5],
+        p[2] - p[3],
+        p[2] - p[4],
+        p[2] - p[5],
+    ];
+    separated(&d, 0.0)
+}
+
+/// Points of four pairs: `group[point][axis][lane]`.
+pub(crate) type Group<const N: usize> = [[[f64; 4]; 3]; N];
 
 macro_rules! four_at_once {
-    ($name:ident, $avx:ident, $one:ident) => {
+    ($name:ident, $avx:ident, $one:ident, $points:literal) => {
         /// Bit per lane: the pair is certainly apart.
         #[inline]
-        pub(crate) fn $name(group: &Group, thickness: f64) -> u32 {
+        pub(crate) fn $name(group: &Group<$points>, thickness: f64) -> u32 {
             #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") {
                 // SAFETY: the processor has AVX2.
@@ -141,8 +165,7 @@ macro_rules! four_at_once {
             }
             let mut bits = 0;
             for lane in 0..4 {
-                let points =
-                    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| Vector([0, 1, 2].map(|k| group[3 * i + k][lane])));
+                let points = group.map(|point| Vector(point.map(|lanes| lanes[lane])));
                 bits |= u32::from($one(&points, thickness)) << lane;
             }
             bits
@@ -150,20 +173,52 @@ macro_rules! four_at_once {
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
-        fn $avx(group: &Group, thickness: f64) -> u32 {
+        fn $avx(group: &Group<$points>, thickness: f64) -> u32 {
             use super::lanes::avx::Four;
-            // SAFETY: this function runs only where the processor has AVX2.
-            let load = |k: usize| unsafe { Four::load(&group[k]) };
-            let mut points = [Vector([Four::splat(0.0); 3]); 8];
-            for (i, point) in points.iter_mut().enumerate() {
-                *point = Vector([load(3 * i), load(3 * i + 1), load(3 * i + 2)]);
+            let mut points = [Vector([Four::splat(0.0); 3]); $points];
+            for (point, [x, y, z]) in points.iter_mut().zip(group) {
+                // SAFETY: this function runs only where the processor has AVX2.
+                *point = unsafe { Vector([Four::load(x), Four::load(y), Four::load(z)]) };
             }
             $one(&points, thickness).bits()
         }
     };
 }
-four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, vertex_triangle_apart);
-four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart);
+four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, vertex_triangle_apart, 8);
+four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart, 8);
+four_at_once!(four_segment_triangles_apart, four_segment_triangles_apart_avx2, segment_triangle_apart, 5);
+four_at_once!(four_triangles_apart, four_triangles_apart_avx2, triangle_triangle_apart, 6);
+
+/// Calls `survivor` with each item that the filter does not reject: `points` writes an item into its lane of a group,
+/// `apart` answers for a group.
+#[inline]
+pub(crate) fn filter<T, const N: usize>(
+    items: &[T],
+    points: impl Fn(&T, usize, &mut Group<N>),
+    apart: impl Fn(&Group<N>) -> u32,
+    mut survivor: impl FnMut(&T),
+) {
+    let mut group = [[[0.0; 4]; 3]; N];
+    for four in items.chunks(4) {
+        for (lane, item) in four.iter().enumerate() {
+            points(item, lane, &mut group);
+        }
+        let apart = apart(&group);
+        for (lane, item) in four.iter().enumerate() {
+            if apart >> lane & 1 == 0 {
+                survivor(item);
+            }
+        }
+    }
+}
+
+/// Writes a point into a lane.
+#[inline]
+pub(crate) fn put<const N: usize>(group: &mut Group<N>, index: usize, lane: usize, point: &Vec3) {
+    for axis in 0..3 {
+        group[index][axis][lane] = point[axis];
+    }
+}
 
 /// One pair.
 pub(crate) fn points(p: &[Vec3; 8]) -> Points<f64> {
