@@ -94,3 +94,53 @@ impl ForceModel for Air {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{Model, Random, forces};
+    use super::*;
+
+    fn triangle(drag: f64, lift: f64, wind: Vec3) -> Model {
+        Box::new(Air { wind, drag, lift, vertices: vec![[0, 1, 2]] })
+    }
+
+    const TRIANGLE: [Vec3; 3] = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(2.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];
+
+    #[test]
+    fn drag_and_lift_by_hand() {
+        // Area 1, normal z. Head-on wind of 3 m/s with ½ρC = 0.5: drag 0.5·1·3·3 = 4.5 along z, a third per corner;
+        // no lift head-on.
+        let still = [Vec3::zeros(); 3];
+        let f = forces(&triangle(0.5, 0.5, Vec3::z() * 3.0), &TRIANGLE, &still);
+        assert!((f[0] - Vec3::z() * 1.5).norm() < 1e-14, "{:?}", f[0]);
+        // Moving with the wind, or wind along the surface: nothing.
+        assert_eq!(forces(&triangle(0.5, 0.5, Vec3::z()), &TRIANGLE, &[Vec3::z(); 3])[1], Vec3::zeros());
+        assert_eq!(forces(&triangle(0.5, 0.5, Vec3::x()), &TRIANGLE, &still)[1], Vec3::zeros());
+        // Wind (1, 0, 1)·√2, |u| = 2, u·n = √2: lift 0.5·√2 (2 z − √2/2 u) = 0.5·√2·(−1, 0, 1), perpendicular to u.
+        let u = Vec3::new(1.0, 0.0, 1.0) * 2f64.sqrt();
+        let f = forces(&triangle(0.0, 0.5, u), &TRIANGLE, &still);
+        let expected = Vec3::new(-1.0, 0.0, 1.0) * (0.5 * 2f64.sqrt() / 3.0);
+        assert!((f[2] - expected).norm() < 1e-14, "{:?}", f[2]);
+        assert!(f[2].dot(&u).abs() < 1e-14);
+    }
+
+    #[test]
+    fn does_not_depend_on_the_front_and_drag_takes_energy() {
+        let mut random = Random::new(4);
+        for _ in 0..20 {
+            let x = random.vectors(3, 1.0);
+            let v = [random.vector(); 3];
+            let wind = random.vector();
+            let f = forces(&triangle(0.4, 0.3, wind), &x, &v)[0];
+            let turned = [x[0], x[2], x[1]];
+            assert!((forces(&triangle(0.4, 0.3, wind), &turned, &v)[0] - f).norm() < 1e-14);
+            assert!(forces(&triangle(0.4, 0.0, Vec3::zeros()), &x, &v)[0].dot(&v[0]) <= 0.0);
+        }
+    }
+
+    #[test]
+    fn collapsed_triangles_have_no_force() {
+        let f = forces(&triangle(1.0, 1.0, Vec3::x()), &[Vec3::y(); 3], &[Vec3::zeros(); 3]);
+        assert_eq!(f[0], Vec3::zeros());
+    }
+}

@@ -301,3 +301,103 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{
+        Model, Random, check_derivatives, check_momentum, check_rigid_motion, check_velocity_terms, energy,
+        forces,
+    };
+    use super::*;
+
+    const LAW: LinearLaw = LinearLaw { rigidity: 2.0, damping: 0.0 };
+    const DAMPED: LinearLaw = LinearLaw { rigidity: 2.0, damping: 0.3 };
+
+    /// A hinge on the x axis with flaps of the given heights, the second folded by θ about the edge.
+    fn folded(theta: f64, heights: [f64; 2]) -> [Vec3; 4] {
+        let (s, c) = theta.sin_cos();
+        [
+            Vec3::zeros(),
+            Vec3::x(),
+            Vec3::new(0.3, heights[0], 0.0),
+            Vec3::new(0.6, -heights[1] * c, -heights[1] * s),
+        ]
+    }
+
+    fn hinge(law: LinearLaw, heights: [f64; 2], rest_angle: f64) -> Model {
+        let rest = Rest::new(1.0, heights.map(|h| 0.5 * h), rest_angle);
+        Box::new(Hinges::new(law, vec![[0, 1, 2, 3]], vec![rest]).unwrap())
+    }
+
+    #[test]
+    fn angle_is_signed_and_right_past_90_degrees() {
+        for degrees in [-179.0, -120.0, -90.0, -30.0, -1e-6, 0.0, 1e-6, 45.0, 90.0, 91.0, 150.0, 179.999_f64] {
+            let theta = degrees.to_radians();
+            let got = dihedral_angle(&folded(theta, [1.0, 0.7]));
+            assert!((got - theta).abs() < 1e-12, "{degrees}: {got}");
+        }
+        let flat = dihedral_angle(&folded(std::f64::consts::PI, [1.0, 0.7])).abs();
+        assert!((flat - std::f64::consts::PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn derivatives_and_invariance() {
+        let mut random = Random::new(3);
+        let cases = [
+            ("near flat", 0.01, [1.0, 0.8]),
+            ("bent", 0.9, [1.0, 0.8]),
+            ("past 90 degrees", 1.9, [0.7, 0.8]),
+            ("past 90 degrees the other way", -2.2, [0.7, 1.1]),
+            ("nearly folded flat", 3.1, [1.0, 0.8]),
+            ("nearly degenerate", 0.8, [0.05, 0.9]),
+        ];
+        for (what, theta, heights) in cases {
+            for _ in 0..3 {
+                let noise = 0.02 * f64::min(heights[0], heights[1]);
+                let x = folded(theta, heights).map(|x| x + random.vector() * noise);
+                let v = random.vectors(4, 1.0);
+                check_derivatives(&hinge(LAW, heights, 0.2), &x, what);
+                check_velocity_terms(&hinge(DAMPED, heights, 0.2), &x, &v, what);
+                check_momentum(&hinge(DAMPED, heights, 0.2), &x, &v, what);
+                check_rigid_motion(&hinge(DAMPED, heights, 0.2), &x, what);
+            }
+        }
+    }
+
+    #[test]
+    fn rest_has_no_energy_and_no_force() {
+        for theta in [0.0, 0.7, -2.5] {
+            let x = folded(theta, [1.0, 0.7]);
+            let model = hinge(LAW, [1.0, 0.7], dihedral_angle(&x));
+            assert_eq!(energy(&model, &x), 0.0);
+            assert!(forces(&model, &x, &[Vec3::zeros(); 4]).iter().all(|f| *f == Vec3::zeros()));
+        }
+    }
+
+    #[test]
+    fn value_by_hand() {
+        // |e| = 1, heights 1 and 0.6, h̄ = 0.8, θ = 0.4, B = 2: K = 0.5, M = 1, energy |e| B θ²/(2 h̄) = 0.2.
+        // Torque |e| M = 1 on each flap: force torque/height = 1 on vertex 2 along its normal (0, 0, 1).
+        let x = folded(0.4, [1.0, 0.6]);
+        let model = hinge(LAW, [1.0, 0.6], 0.0);
+        assert!((energy(&model, &x) - 0.2).abs() < 1e-14);
+        let f = forces(&model, &x, &[Vec3::zeros(); 4]);
+        assert!((f[2] - Vec3::z()).norm() < 1e-13, "{:?}", f[2]);
+        assert!((f[3].norm() - 1.0 / 0.6).abs() < 1e-13);
+        // The moment restores: the force on the folded flap turns it back.
+        let closing = Vec3::new(0.0, 0.4_f64.sin(), -(0.4_f64.cos()));
+        assert!(f[3].dot(&closing) < 0.0);
+    }
+
+    #[test]
+    fn collapsed_hinges_stay_finite_and_bad_ones_are_named() {
+        let model = hinge(DAMPED, [1.0, 1.0], 0.0);
+        for x in [[Vec3::zeros(); 4], [Vec3::zeros(), Vec3::x(), Vec3::x() * 0.4, Vec3::x() * 0.2]] {
+            let f = forces(&model, &x, &[Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()]);
+            assert!(f.iter().all(|f| f.iter().all(|c| c.is_finite())), "{f:?}");
+        }
+        let rest = vec![Rest::new(1.0, [1.0, 1.0], 0.0), Rest::new(1.0, [0.0, 0.0], 0.0)];
+        let error = Hinges::new(LAW, vec![[0, 1, 2, 3], [4, 5, 6, 7]], rest).err();
+        assert!(matches!(error, Some(CoreError::Degenerate { element: 1, ref vertices, .. }) if vertices == &[4, 5, 6, 7]));
+    }
+}

@@ -16,6 +16,9 @@ pub(crate) mod hinge;
 pub(crate) mod spring;
 pub(crate) mod stretch_shear;
 
+#[cfg(test)]
+pub(crate) mod testing;
+
 
 use std::ops::Range;
 

@@ -313,3 +313,83 @@ fn corner_block(huu: &Block, hvv: &Block, huv: &Block, rest: &Rest, a: usize, b:
     }
     block
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{
+        Model, Random, check_derivatives, check_momentum, check_rigid_motion, check_velocity_terms, energy,
+        forces,
+    };
+    use super::*;
+
+    const STIFFNESS: Stiffness = Stiffness { warp: 50.0, weft: 30.0, shear: 12.0, damping: 0.0 };
+
+    /// Two triangles of a unit square with material axes along its sides.
+    fn square(stiffness: Stiffness) -> Model {
+        let vertices = vec![[0, 1, 2], [3, 2, 1]];
+        let inverse = [[[1.0, 0.0], [0.0, 1.0]], [[-1.0, 0.0], [0.0, -1.0]]];
+        Box::new(StretchShear::new(stiffness, vertices, &inverse, &[0.5, 0.5]).unwrap())
+    }
+
+    fn at_rest() -> [Vec3; 4] {
+        [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::new(1.0, 1.0, 0.0)]
+    }
+
+    #[test]
+    fn derivatives_and_invariance() {
+        let mut random = Random::new(2);
+        for case in 0..8 {
+            // Around rest, stretched, compressed, far from rest.
+            let scale = [1.02, 1.6, 0.5, 1.0][case % 4];
+            let noise = [0.05, 0.3, 0.1, 0.9][case % 4];
+            let x: Vec<Vec3> = at_rest().iter().map(|x| x * scale + random.vector() * noise).collect();
+            let v = random.vectors(4, 2.0);
+            let damped = Stiffness { damping: 0.03, ..STIFFNESS };
+            check_derivatives(&square(STIFFNESS), &x, "stretch and shear");
+            check_velocity_terms(&square(damped), &x, &v, "stretch and shear");
+            check_momentum(&square(damped), &x, &v, "stretch and shear");
+            check_rigid_motion(&square(damped), &x, "stretch and shear");
+        }
+    }
+
+    #[test]
+    fn rest_has_no_energy_and_no_force() {
+        let model = square(STIFFNESS);
+        assert_eq!(energy(&model, &at_rest()), 0.0);
+        assert!(forces(&model, &at_rest(), &[Vec3::zeros(); 4]).iter().all(|f| *f == Vec3::zeros()));
+    }
+
+    #[test]
+    fn value_by_hand() {
+        // Unit square stretched by 1.2 along u and sheared by 0.5: w_u = (1.2, 0), w_v = (0.5, 1).
+        // C_u = 0.2, C_v = √1.25 − 1 = 0.1180339887, C_s = 0.6.
+        // E = ½ [50·0.04 + 30·0.01393202250 + 12·0.36] = 1 + 0.2089803375 + 2.16.
+        let x = at_rest().map(|x| Vec3::new(1.2 * x.x + 0.5 * x.y, x.y, 0.0));
+        let e = energy(&square(STIFFNESS), &x);
+        assert!((e - 3.368_980_337_5).abs() < 1e-9, "{e}");
+        // Warp and weft stiffness are apart: the same along v with only the weft counts 30, along u 50.
+        let along_u = energy(&square(STIFFNESS), &at_rest().map(|x| Vec3::new(1.1 * x.x, x.y, 0.0)));
+        let along_v = energy(&square(STIFFNESS), &at_rest().map(|x| Vec3::new(x.x, 1.1 * x.y, 0.0)));
+        assert!((along_u - 0.25).abs() < 1e-12 && (along_v - 0.15).abs() < 1e-12, "{along_u} {along_v}");
+    }
+
+    #[test]
+    fn stiffness_does_not_depend_on_the_triangle_size() {
+        // The same square at a tenth of the size stores a hundredth of the energy at equal strain.
+        let inverse = [[[10.0, 0.0], [0.0, 10.0]], [[-10.0, 0.0], [0.0, -10.0]]];
+        let small: Model = Box::new(
+            StretchShear::new(STIFFNESS, vec![[0, 1, 2], [3, 2, 1]], &inverse, &[0.005, 0.005]).unwrap(),
+        );
+        let x = at_rest().map(|x| Vec3::new(1.3 * x.x, 0.9 * x.y + 0.2 * x.x, 0.0));
+        let (large, small) = (energy(&square(STIFFNESS), &x), energy(&small, &x.map(|x| x * 0.1)));
+        assert!((large / small - 100.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn collapsed_triangles_stay_finite_and_bad_ones_are_named() {
+        let f = forces(&square(STIFFNESS), &[Vec3::zeros(); 4], &[Vec3::x(); 4]);
+        assert!(f.iter().all(|f| f.iter().all(|c| c.is_finite())));
+        let error = StretchShear::new(STIFFNESS, vec![[5, 6, 9]], &[[[1.0, 0.0], [0.0, 1.0]]], &[0.0]);
+        assert!(matches!(error.err(), Some(CoreError::Degenerate { element: 0, ref vertices, .. }) if vertices == &[5, 6, 9]));
+    }
+}
