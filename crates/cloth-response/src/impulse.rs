@@ -46,7 +46,7 @@ pub(crate) struct Contact {
     share: [f64; 4],
     pub(crate) normal: Vec3,
     /// Effective mass [kg].
-    mass: f64,
+    pub(crate) mass: f64,
     pub(crate) law: NormalLaw,
     friction: f64,
     /// On the first point [N s].

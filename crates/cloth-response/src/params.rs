@@ -16,7 +16,8 @@ pub struct ResponseParams {
     pub max_passes: usize,
     /// Cap on continuous-detection passes that answer with rigid impact zones.
     pub max_zone_passes: usize,
-    /// Cap on sweeps over all contacts within one pass; reaching it is no error (the passes go on) and is reported.
+    /// Cap on the work of one pass: contacts are relaxed at most this many times their number. Reaching it is no
+    /// error (the passes go on); the residual is reported.
     pub max_sweeps: usize,
     /// A contact whose relative velocity is off by less than this is left alone [m/s], > 0.
     pub velocity_tolerance: f64,
@@ -33,7 +34,7 @@ impl Default for ResponseParams {
             friction: FrictionRule::default(),
             max_passes: 6,
             max_zone_passes: 8,
-            max_sweeps: 60,
+            max_sweeps: 30,
             velocity_tolerance: 1e-6,
             allow_initial_contacts: false,
         }
