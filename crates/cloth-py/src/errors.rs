@@ -55,11 +55,9 @@ pub(crate) fn mesh_error(py: Python<'_>, error: &MeshError) -> PyErr {
         MeshError::UvLength { .. } => ("uv-length", vec![], vec![]),
         MeshError::UvNotFinite { triangle, .. } => ("uv-not-finite", vec![], vec![*triangle as u64]),
         MeshError::ZeroAreaUv { triangle, .. } => ("zero-area-uv", vec![], vec![*triangle as u64]),
-        MeshError::DuplicateTriangle { triangles, vertices } => (
-            "duplicate-triangle",
-            vertices.map(u64::from).to_vec(),
-            triangles.map(u64::from).to_vec(),
-        ),
+        MeshError::DuplicateTriangle { triangles, vertices } => {
+            ("duplicate-triangle", vertices.map(u64::from).to_vec(), triangles.map(u64::from).to_vec())
+        }
         MeshError::Parameter { .. } => ("parameter", vec![], vec![]),
         MeshError::Empty => ("empty", vec![], vec![]),
     };
@@ -158,8 +156,8 @@ pub(crate) fn sim_error(py: Python<'_>, error: &SimError) -> PyErr {
         }
         SimError::InvalidCheckpoint { .. } => exception(py, "CheckpointError", &message, |_| Ok(())),
         SimError::InvalidArgument { name, expected, got } => invalid_input(py, name, expected, got),
-        SimError::Stage { stage, .. } => exception(py, "SolverFailed", &message, |attributes| {
-            attributes.set_item("stage", *stage)
-        }),
+        SimError::Stage { stage, .. } => {
+            exception(py, "SolverFailed", &message, |attributes| attributes.set_item("stage", *stage))
+        }
     }
 }

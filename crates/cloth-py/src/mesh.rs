@@ -8,7 +8,8 @@ use crate::convert::{corner_uv_from, indices_to_numpy, points_to_numpy, triangle
 use crate::errors::mesh_error;
 
 /// `(vertices (n, 3), triangles (m, 3), uv (m, 3, 2) or None)`.
-pub(crate) type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, Option<Bound<'py, PyArray3<f64>>>);
+pub(crate) type Arrays<'py> =
+    (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, Option<Bound<'py, PyArray3<f64>>>);
 
 /// The engine's mesh from arrays; UV per triangle corner.
 ///

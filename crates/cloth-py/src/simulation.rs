@@ -214,7 +214,8 @@ impl PySimulation {
     fn interruptible(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Simulation, &mut dyn FnMut() -> ControlFlow<()>) -> Result<Advance, SimError> + Send,
+        work: impl FnOnce(&mut Simulation, &mut dyn FnMut() -> ControlFlow<()>) -> Result<Advance, SimError>
+        + Send,
     ) -> PyResult<usize> {
         let mut raised: Option<PyErr> = None;
         let mut check = || match Python::attach(|py| py.check_signals()) {
