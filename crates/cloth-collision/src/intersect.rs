@@ -23,7 +23,8 @@ pub fn self_intersections(
 /// and the other have a common point (touching and coplanar overlap included); two triangles with one common
 /// vertex meet if the side opposite to it of one has a point in common with the other. Two triangles with a common
 /// side are never reported, not even folded onto each other, and a triangle without area meets another only through its
-/// sides, and none without area. A state that continuous detection has found free of contact has no intersection.
+/// sides, and none without area. A motion that starts without intersections and that continuous detection finds
+/// free of contact ends without.
 ///
 /// # Errors
 /// [`DetectError::Length`], [`DetectError::NotFinite`].

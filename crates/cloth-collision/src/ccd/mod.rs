@@ -58,7 +58,10 @@ trait Motion<const K: usize> {
 /// later than the first time in \[0, 1\] at which the distance is ≤ `thickness` \[m\]; a pair that stays farther apart
 /// than about 1e-14 of its size at all times gets `None`. A coordinate that is not finite gives `Some(0)`.
 pub fn vertex_triangle_ccd(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
-    if is_finite(p) && filter::vertex_triangle_apart(&filter::points(p), thickness) {
+    if !is_finite(p) {
+        return Some(0.0);
+    }
+    if filter::vertex_triangle_apart(&filter::points(p), thickness) {
         return None;
     }
     vertex_triangle_march(p, thickness)
@@ -68,7 +71,10 @@ pub fn vertex_triangle_ccd(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
 ///
 /// `p`: a0, a1, b0, b1 at t0, then at t1 \[m\]; each moves linearly. The answer is as in [`vertex_triangle_ccd`].
 pub fn edge_edge_ccd(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
-    if is_finite(p) && filter::edge_edge_apart(&filter::points(p), thickness) {
+    if !is_finite(p) {
+        return Some(0.0);
+    }
+    if filter::edge_edge_apart(&filter::points(p), thickness) {
         return None;
     }
     edge_edge_march(p, thickness)
@@ -78,12 +84,12 @@ fn is_finite(p: &[Vec3; 8]) -> bool {
     p.iter().all(|p| p.x.is_finite() && p.y.is_finite() && p.z.is_finite())
 }
 
-/// [`vertex_triangle_ccd`] of a pair that the filter has not rejected.
+/// [`vertex_triangle_ccd`] of finite points that the filter has not rejected.
 pub(crate) fn vertex_triangle_march(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
     march(VertexTriangleMotion::new(p, thickness))
 }
 
-/// [`edge_edge_ccd`] of a pair that the filter has not rejected.
+/// [`edge_edge_ccd`] of finite points that the filter has not rejected.
 pub(crate) fn edge_edge_march(p: &[Vec3; 8], thickness: f64) -> Option<f64> {
     march(EdgeEdgeMotion::new(p, thickness))
 }

@@ -21,8 +21,7 @@ pub(crate) const BEYOND_END: f64 = 2.0;
 
 impl<const K: usize> Relative<K> {
     pub(crate) fn new(d0: [Vec3; K], d1: [Vec3; K], thickness: f64) -> Self {
-        // A NaN must not get lost in `max`, and a sum keeps it: x − x is NaN for infinite and NaN coordinates.
-        let extent = d0.iter().chain(&d1).fold(0.0f64, |e, d| e.max(d.amax()) + (d - d).sum());
+        let extent = d0.iter().chain(&d1).fold(0.0f64, |extent, d| extent.max(d.amax()));
         Self { d0, d1, extent, thickness }
     }
 

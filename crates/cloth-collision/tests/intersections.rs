@@ -1,0 +1,173 @@
+//! Triangles that pass through each other.
+
+mod support;
+
+use cloth_collision::{
+    BruteForce, Bvh, CollisionMesh, DetectError, Detector, Mode, Query, Vec3, intersections,
+    self_intersections,
+};
+use support::{Random, bodies, pool, sheet, soup};
+
+const TARGET: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]];
+
+/// Whether a lone triangle and the target meet.
+fn meets(corners: [[f64; 3]; 3]) -> bool {
+    let x: Vec<Vec3> = TARGET.iter().chain(&corners).map(|&p| Vec3::from(p)).collect();
+    let both = self_intersections(&[[0, 1, 2], [3, 4, 5]], &x, &pool(1)).unwrap();
+    let turned = self_intersections(&[[4, 3, 5], [2, 0, 1]], &x, &pool(1)).unwrap();
+    assert_eq!(both, turned, "order must not matter: {corners:?}");
+    both == [[0, 1]]
+}
+
+#[test]
+fn named_cases() {
+    let up = [1.0, 1.0, 1.0];
+    assert!(meets([[1.0, -1.0, 1.0], up, [9.0, 1.0, 9.0]]), "pierces the face");
+    assert!(meets([[-5.0, 0.5, 1.0], [5.0, -0.5, 1.0], [0.0, -9.0, 1.0]]), "cuts a side");
+    assert!(meets([[1.0, 0.0, 1.0], up, [2.0, 1.0, 1.0]]), "a corner touches the face");
+    assert!(meets([[4.0, 0.0, 0.0], up, [9.0, 1.0, 1.0]]), "a corner touches a corner");
+    assert!(meets([[2.0, 0.0, -1.0], [2.0, 0.0, 1.0], [2.0, 1.0, 0.0]]), "a side lies in the face");
+    assert!(meets([[1.0, 0.0, 1.0], [1.5, 0.0, 1.0], [1.0, 0.0, 1.5]]), "coplanar, inside");
+    assert!(meets([[-9.0, 0.0, -9.0], [90.0, 0.0, -9.0], [-9.0, 0.0, 90.0]]), "coplanar, around");
+    assert!(meets([[1.0, 0.0, -1.0], [1.5, 0.0, 9.0], [1.0, 0.0, 9.0]]), "coplanar, across");
+    assert!(meets([[5.0, 0.0, 0.0], [3.0, 0.0, 0.0], [5.0, 1.0, 0.0]]), "sides overlap in one line");
+
+    assert!(!meets([[1.0, 1e-300, 1.0], up, [2.0, 1.0, 1.0]]), "a hair above");
+    assert!(!meets([[3.0, -1.0, 3.0], [3.0, 1.0, 3.0], [9.0, 0.0, 9.0]]), "beside, across the plane");
+    assert!(!meets([[2.0, 0.0, 2.0000001], [5.0, 0.0, 5.0], [2.0, 0.0, 9.0]]), "coplanar, beside");
+    assert!(!meets([[5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 1.0, 0.0]]), "in the line of a side, beyond");
+    assert!(meets([[1.0, -1.0, 1.0], up, [1.0, 3.0, 1.0]]), "a triangle without area pierces");
+    assert!(
+        !meets([[3.0, -1.0, 3.0], [3.0, 1.0, 3.0], [3.0, 3.0, 3.0]]),
+        "a triangle without area passes by"
+    );
+}
+
+#[test]
+fn neighbours_meet_only_past_what_they_share() {
+    let pairs = |apex: [f64; 3], shared: usize| {
+        let mut x: Vec<Vec3> = TARGET.iter().map(|&p| Vec3::from(p)).collect();
+        x.push(Vec3::new(-1.0, -1.0, 1.0));
+        x.push(Vec3::from(apex));
+        let second = if shared == 1 { [0, 3, 4] } else { [0, 1, 4] };
+        self_intersections(&[[0, 1, 2], second], &x, &pool(1)).unwrap().len()
+    };
+    assert_eq!(pairs([-1.0, 1.0, 1.0], 1), 0, "touching at the common vertex alone");
+    assert_eq!(pairs([2.0, 1.0, 1.0], 1), 1, "the side opposite to it passes through");
+    assert_eq!(pairs([2.0, 0.0, 1.0], 2), 0, "folded onto each other along a common side");
+}
+
+/// Every pair of triangles, in floating point.
+fn by_every_pair(mesh: &CollisionMesh, x: &[Vec3]) -> Vec<[u32; 2]> {
+    let mut found = vec![];
+    let n = mesh.triangles.len() as u32;
+    for s in 0..n {
+        for t in s + 1..n {
+            let (first, second) = (mesh.triangles[s as usize], mesh.triangles[t as usize]);
+            let (a, b) = (mesh.vertex_body[first[0] as usize], mesh.vertex_body[second[0] as usize]);
+            let attached = first.iter().any(|&v| mesh.attached_to[v as usize] == b)
+                || second.iter().any(|&v| mesh.attached_to[v as usize] == a);
+            if first.iter().filter(|v| second.contains(v)).count() >= 2 || !mesh.bodies_meet(a, b) || attached
+            {
+                continue;
+            }
+            let mut sides = vec![];
+            for (one, other) in [(first, second), (second, first)] {
+                for k in 0..3 {
+                    let side = [one[k], one[(k + 1) % 3]];
+                    if !side.iter().any(|v| other.contains(v)) {
+                        sides.push((side, other));
+                    }
+                }
+            }
+            if sides
+                .iter()
+                .any(|&(side, other)| pierces(side.map(|v| x[v as usize]), other.map(|v| x[v as usize])))
+            {
+                found.push([s, t]);
+            }
+        }
+    }
+    found
+}
+
+/// Generic position only: the segment crosses the plane inside the triangle.
+fn pierces([p, q]: [Vec3; 2], [a, b, c]: [Vec3; 3]) -> bool {
+    let n = (b - a).cross(&(c - a));
+    let (hp, hq) = (n.dot(&(p - a)), n.dot(&(q - a)));
+    if (hp > 0.0) == (hq > 0.0) {
+        return false;
+    }
+    let x = p + (q - p) * (hp / (hp - hq));
+    [(a, b), (b, c), (c, a)].iter().all(|(r, s)| (s - r).cross(&(x - r)).dot(&n) >= 0.0)
+}
+
+#[test]
+fn random_scenes_agree_with_every_pair() {
+    let mut total = 0;
+    for seed in 0..8 {
+        let mut random = Random(seed);
+        let (x, triangles) = soup(60, 0.3, &mut random);
+        let expected = by_every_pair(&CollisionMesh::single(x.len(), &triangles).unwrap(), &x);
+        for threads in [1, 2] {
+            assert_eq!(self_intersections(&triangles, &x, &pool(threads)).unwrap(), expected);
+        }
+        let (mesh, x) = bodies(&mut random);
+        let with_rules = by_every_pair(&mesh, &x);
+        assert_eq!(intersections(&mesh, &x, &pool(1)).unwrap(), with_rules);
+        assert_eq!(Bvh::new(&mesh, &x).unwrap().intersections(&mesh, &x, &pool(2)).unwrap(), with_rules);
+        total += expected.len() + with_rules.len();
+    }
+    assert!(total > 500, "the scenes must hold intersections, found {total}");
+}
+
+#[test]
+fn a_flat_sheet_does_not_meet_itself() {
+    let mut random = Random(1);
+    for offset in [0.0, 1e5] {
+        let (mut x, triangles) = sheet(40, &mut random);
+        x.iter_mut().for_each(|p| *p = Vec3::new(p.x + offset, 1.0, p.z + offset));
+        assert!(self_intersections(&triangles, &x, &pool(1)).unwrap().is_empty());
+    }
+}
+
+#[test]
+fn motion_free_of_contact_makes_no_intersection() {
+    let mut random = Random(9);
+    let (mut free, mut hit) = (0, 0);
+    for _ in 0..2000 {
+        let (x_t0, triangles) = soup(3, 0.4, &mut random);
+        if !self_intersections(&triangles, &x_t0, pool_of_one()).unwrap().is_empty() {
+            continue;
+        }
+        let x_t1: Vec<Vec3> = x_t0.iter().map(|x| x + random.vector(0.4)).collect();
+        let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+        let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
+        let contacts = BruteForce.detect(&mesh, &query, pool_of_one()).unwrap();
+        if contacts.vertex_triangle.is_empty() && contacts.edge_edge.is_empty() {
+            free += 1;
+            assert!(self_intersections(&triangles, &x_t1, pool_of_one()).unwrap().is_empty());
+        } else {
+            hit += 1;
+        }
+    }
+    assert!(free > 50 && hit > 50, "{free} free motions, {hit} with contacts");
+}
+
+fn pool_of_one() -> &'static rayon::ThreadPool {
+    static POOL: std::sync::OnceLock<rayon::ThreadPool> = std::sync::OnceLock::new();
+    POOL.get_or_init(|| pool(1))
+}
+
+#[test]
+fn bad_input_is_named() {
+    let x = vec![Vec3::zeros(), Vec3::x(), Vec3::new(0.0, f64::NAN, 0.0)];
+    assert!(matches!(
+        self_intersections(&[[0, 1, 2]], &x, &pool(1)),
+        Err(DetectError::NotFinite { vertex: 2, .. })
+    ));
+    assert!(matches!(
+        self_intersections(&[[0, 1, 3]], &x, &pool(1)),
+        Err(DetectError::IndexOutOfRange { index: 3, .. })
+    ));
+}
