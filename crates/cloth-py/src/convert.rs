@@ -6,7 +6,7 @@
 
 use cloth_sim::core::mesh::Vec3;
 use numpy::{
-    IntoPyArray, PyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
+    IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
     PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
@@ -148,16 +148,16 @@ pub(crate) fn points_to_numpy<'py>(py: Python<'py>, points: &[Vec3]) -> Bound<'p
 }
 
 /// An (n, K) int64 array of indices: a copy that NumPy owns.
-pub(crate) fn indices_to_numpy<'py, const K: usize>(
-    py: Python<'py>,
+pub(crate) fn indices_to_numpy<const K: usize>(
+    py: Python<'_>,
     rows: impl ExactSizeIterator<Item = [u32; K]>,
-) -> Bound<'py, PyArray2<i64>> {
+) -> Bound<'_, PyArray2<i64>> {
     let count = rows.len();
     let flat: Vec<i64> = rows.flatten().map(i64::from).collect();
     rows_of(py, flat, count, K)
 }
 
-/// `flat` as `rows` × `columns`.
+/// `flat` as `rows` × `columns`, which is its length.
 fn rows_of<T: numpy::Element>(
     py: Python<'_>,
     flat: Vec<T>,
@@ -165,5 +165,5 @@ fn rows_of<T: numpy::Element>(
     columns: usize,
 ) -> Bound<'_, PyArray2<T>> {
     let shape = [rows, columns];
-    flat.into_pyarray(py).reshape(shape).unwrap_or_else(|_| PyArray::zeros(py, shape, false))
+    flat.into_pyarray(py).reshape(shape).expect("rows × columns is the length")
 }

@@ -53,7 +53,7 @@ pub(crate) fn check_mesh(
     mesh_from(vertices, triangles, uv)?.check().map_err(|error| mesh_error(py, &error))
 }
 
-fn made<'py>(py: Python<'py>, mesh: Result<TriMesh, MeshError>) -> PyResult<Arrays<'py>> {
+fn made(py: Python<'_>, mesh: Result<TriMesh, MeshError>) -> PyResult<Arrays<'_>> {
     let TriMesh { vertices, triangles, uv } = mesh.map_err(|error| mesh_error(py, &error))?;
     mesh_to_numpy(py, &vertices, triangles, uv)
 }

@@ -74,17 +74,17 @@ impl PySimulation {
 
     /// Take one step of the scene's size.
     fn step(&self, py: Python<'_>) -> PyResult<()> {
-        self.detached(py, |simulation| simulation.step())
+        self.detached(py, |simulation| simulation.step().map_err(Box::new))
     }
 
     /// Advance in equal steps; Ctrl-C is looked for before each. Returns the number of steps.
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<usize> {
-        self.interruptible(py, |simulation, check| simulation.advance(seconds, check))
+        self.interruptible(py, |simulation, check| simulation.advance(seconds, check).map_err(Box::new))
     }
 
     /// Do what an interrupted `advance` has left.
     fn finish_advance(&self, py: Python<'_>) -> PyResult<usize> {
-        self.interruptible(py, Simulation::finish_advance)
+        self.interruptible(py, |simulation, check| simulation.finish_advance(check).map_err(Box::new))
     }
 
     /// Whether an interrupted `advance` has something left.
@@ -182,7 +182,7 @@ impl PySimulation {
 
     /// Pairs of triangles that pass through each other now, (k, 2).
     fn intersections<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
-        let pairs = self.detached(py, |simulation| simulation.intersections())?;
+        let pairs = self.detached(py, |simulation| simulation.intersections().map_err(Box::new))?;
         Ok(crate::convert::indices_to_numpy(py, pairs.into_iter()))
     }
 
@@ -205,20 +205,20 @@ impl PySimulation {
     fn detached<T: Send>(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Simulation) -> Result<T, SimError> + Send,
+        work: impl FnOnce(&mut Simulation) -> Result<T, Box<SimError>> + Send,
     ) -> PyResult<T> {
-        py.detach(|| work(&mut self.lock()).map_err(Box::new)).map_err(|error| sim_error(py, &error))
+        py.detach(|| work(&mut self.lock())).map_err(|error| sim_error(py, &error))
     }
 
     /// Runs an advance that can be stopped between steps by a Python signal handler that raises.
     fn interruptible(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Simulation, &mut dyn FnMut() -> ControlFlow<()>) -> Result<Advance, SimError>
+        work: impl FnOnce(&mut Simulation, &mut dyn FnMut() -> ControlFlow<()>) -> Result<Advance, Box<SimError>>
         + Send,
     ) -> PyResult<usize> {
         let mut raised: Option<PyErr> = None;
-        let mut check = || match Python::attach(|py| py.check_signals()) {
+        let mut check = || match Python::attach(Python::check_signals) {
             Ok(()) => ControlFlow::Continue(()),
             Err(error) => {
                 raised = Some(error);

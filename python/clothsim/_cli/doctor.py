@@ -7,12 +7,11 @@ import importlib.metadata
 import json
 import os
 import platform
-import shutil
-import subprocess
 from pathlib import Path
 from typing import Any
 
 from clothsim import _core
+from clothsim._cli import vulkan
 from clothsim._data import VARIABLE, data_folder
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
@@ -29,7 +28,6 @@ _OPTIONAL = {
     "pyvista": "film strips",
     "matplotlib": "plots",
 }
-_TIMEOUT = 20  # s, for a driver that hangs
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,27 +93,10 @@ def _lines(path: Path) -> list[str]:
 
 
 def gpu_adapters() -> dict[str, Any]:
-    """Vulkan adapters as ``vulkaninfo`` lists them; without it, the drivers that are installed."""
+    """Vulkan adapters, and why there are none if so."""
+    found, problem = vulkan.adapters()
     note = "this build detects collisions on the CPU; adapters are listed for information"
-    tool = shutil.which("vulkaninfo")
-    if tool is None:
-        folders = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
-        drivers = sorted(file.stem for folder in folders if folder.is_dir() for file in folder.glob("*.json"))
-        return {"adapters": [], "drivers": drivers, "note": f"{note}; vulkaninfo (vulkan-tools) is not installed"}
-    try:
-        summary = subprocess.run(
-            [tool, "--summary"], capture_output=True, text=True, timeout=_TIMEOUT, check=False
-        ).stdout
-    except (OSError, subprocess.TimeoutExpired) as error:
-        return {"adapters": [], "drivers": [], "note": f"{note}; vulkaninfo failed: {error}"}
-    adapters: list[dict[str, str]] = []
-    for line in summary.splitlines():
-        key, _, value = (part.strip() for part in line.partition("="))
-        if line.startswith("GPU") and line.rstrip().endswith(":"):
-            adapters.append({})
-        elif adapters and key in ("deviceName", "deviceType", "driverName", "driverInfo", "apiVersion"):
-            adapters[-1][key] = value
-    return {"adapters": adapters, "drivers": [], "note": note}
+    return {"adapters": found, "note": note if not problem else f"{problem}; {note}"}
 
 
 def _text(facts: dict[str, Any]) -> str:
@@ -127,13 +108,8 @@ def _text(facts: dict[str, Any]) -> str:
         ("processor", f"{processor['model']}; {' '.join(processor['features']) or 'no features listed'}"),
         ("threads", f"{facts['threads']}; memory {facts['memory_gib']} GiB"),
     ]
-    gpu = facts["gpu"]
-    for adapter in gpu["adapters"]:
-        name, kind = adapter.get("deviceName", "?"), adapter.get("deviceType", "?")
-        rows.append(("GPU", f"{name} ({kind}, {adapter.get('driverInfo', adapter.get('driverName', '?'))})"))
-    if not gpu["adapters"]:
-        rows.append(("GPU", f"no adapter seen; Vulkan drivers: {', '.join(gpu['drivers']) or 'none'}"))
-    rows.append(("", gpu["note"]))
+    adapters = [("GPU", f"{a['name']} ({a['type']}, {a['api']})") for a in facts["gpu"]["adapters"]]
+    rows += [*adapters, ("" if adapters else "GPU", facts["gpu"]["note"])]
     for name, purpose in _OPTIONAL.items():
         version = facts["packages"][name]
         rows.append((name, f"{version or 'not installed'}  ({purpose})"))

@@ -74,7 +74,8 @@ def render(recording: Recording, frame: int, size: tuple[int, int] = _TILE) -> A
     plotter = pv.Plotter(off_screen=True, window_size=[side * _SUPERSAMPLING for side in size], lighting="none")
     try:
         plotter.set_background("#f4f2ee")
-        low, high = _bounds(recording)
+        subject = _subject(recording)
+        low, high = subject.min(axis=0), subject.max(axis=0)
         up = 2 if recording.up == "z" else 1
         centre, reach = 0.5 * (low + high), float(np.linalg.norm(high - low))
         floor = low[up] - 0.004 * reach
@@ -83,7 +84,7 @@ def render(recording: Recording, frame: int, size: tuple[int, int] = _TILE) -> A
             if not _is_backdrop(recording, body, reach):
                 _add_body(pv, plotter, recording, body, frame, number)
         _add_lights(pv, plotter, centre, reach, up)
-        _place_camera(plotter, low, high, up)
+        _place_camera(plotter, subject, up)
         plotter.enable_shadows()
         _refine_shadows(plotter)
         image = plotter.screenshot(None, return_img=True)
@@ -95,18 +96,16 @@ def render(recording: Recording, frame: int, size: tuple[int, int] = _TILE) -> A
     return np.rint(tiles.mean(axis=(1, 3))).astype(np.uint8)
 
 
-def _bounds(recording: Recording) -> tuple[Floats, Floats]:
-    """Box around all cloth over the whole run (a sample of frames), and around colliders near it."""
+def _subject(recording: Recording) -> Floats:
+    """Points that are to be seen: the cloth over the whole run (a sample of it), and colliders of about its size."""
     frames = np.unique(np.linspace(0, len(recording) - 1, 25).astype(int))
-    cloth = [recording.positions(body, int(f)) for body in recording.cloth for f in frames]
-    low = np.min([x.min(axis=0) for x in cloth], axis=0)
-    high = np.max([x.max(axis=0) for x in cloth], axis=0)
-    span = float(np.linalg.norm(high - low))
+    points = [recording.positions(body, int(f))[::7] for body in recording.cloth for f in frames]
+    span = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
     for body in recording.bodies:
         x = recording.positions(body, 0)
         if body.kind == "collider" and np.linalg.norm(np.ptp(x, axis=0)) < 1.5 * span:
-            low, high = np.minimum(low, x.min(axis=0)), np.maximum(high, x.max(axis=0))
-    return low, high
+            points.append(x)
+    return np.concatenate(points)
 
 
 def _is_backdrop(recording: Recording, body: Body, reach: float) -> bool:
@@ -176,23 +175,23 @@ def _unit(vector: Floats) -> Floats:
     return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
 
 
-def _place_camera(plotter: Any, low: Floats, high: Floats, up: int) -> None:
-    """Looks down a little from the front right, so that everything just fits."""
+def _place_camera(plotter: Any, subject: Floats, up: int) -> None:
+    """Look down a little from the front right, as near as all points of the subject allow."""
     right, upward, front = _axes(up)
-    view = 0.5 * right + 0.55 * upward + 1.0 * front
-    view = _unit(view)
+    view = _unit(0.5 * right + 0.55 * upward + 1.0 * front)
+    across = _unit(np.cross(upward, view))
+    above = np.cross(view, across)
     camera = plotter.camera
     camera.up = tuple(upward)
     camera.view_angle = 28.0
-    centre = 0.5 * (low + high)
-    corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T - centre
-    across = _unit(np.cross(upward, view))
-    above = np.cross(view, across)
-    tangent = np.tan(np.radians(camera.view_angle / 2)) * 0.94
-    # The distance at which every corner of the box lies inside the field of view.
-    needed = [abs(float(c @ axis)) / tangent + float(c @ view) for c in corners for axis in (across, above)]
-    camera.focal_point = tuple(centre)
-    camera.position = tuple(centre + view * max(needed))
+    tangent = np.tan(np.radians(camera.view_angle / 2)) * 0.92
+    axes = np.stack([across, above, view])
+    local = subject @ axes.T
+    centre = 0.5 * (local.min(axis=0) + local.max(axis=0))
+    offset = local - centre
+    distance = float((np.abs(offset[:, :2]).max(axis=1) / tangent + offset[:, 2]).max())
+    camera.focal_point = tuple(centre @ axes)
+    camera.position = tuple((centre + [0.0, 0.0, distance]) @ axes)
     plotter.renderer.reset_camera_clipping_range()
 
 
