@@ -218,7 +218,7 @@ impl PySimulation {
         + Send,
     ) -> PyResult<usize> {
         let mut raised: Option<PyErr> = None;
-        let mut check = || match Python::attach(Python::check_signals) {
+        let mut check = || match Python::attach(check_signals) {
             Ok(()) => ControlFlow::Continue(()),
             Err(error) => {
                 raised = Some(error);
@@ -231,6 +231,11 @@ impl PySimulation {
             None => Ok(advance.steps),
         }
     }
+}
+
+/// Runs the handlers of signals that have come; one that raises (Ctrl-C) is the error.
+fn check_signals(py: Python<'_>) -> PyResult<()> {
+    py.check_signals()
 }
 
 fn json(py: Python<'_>, value: &impl Serialize) -> PyResult<String> {
