@@ -3,7 +3,9 @@
 use std::ops::AddAssign;
 
 /// Mechanical energy of a state by kind [J].
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 pub struct Energy {
     /// ½ Σ m |v|².
     pub kinetic: f64,

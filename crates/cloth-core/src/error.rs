@@ -24,7 +24,9 @@ pub enum CoreError {
         known: Vec<&'static str>,
     },
     /// An element has no extent in its rest shape, so its law is not defined.
-    #[error("{model}: expected elements with an extent, element {element} (vertices {vertices:?}) has {measure} {got:e}")]
+    #[error(
+        "{model}: expected elements with an extent, element {element} (vertices {vertices:?}) has {measure} {got:e}"
+    )]
     Degenerate {
         /// The force model.
         model: &'static str,

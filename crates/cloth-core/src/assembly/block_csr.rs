@@ -103,8 +103,8 @@ impl BlockMatrix {
     #[target_feature(enable = "avx")]
     unsafe fn multiply_rows_avx(&self, first: usize, x: &[Lanes], out: &mut [Lanes]) {
         use std::arch::x86_64::{
-            _mm256_add_pd, _mm256_broadcast_sd, _mm256_load_pd, _mm256_loadu_pd, _mm256_mul_pd, _mm256_set_pd,
-            _mm256_setzero_pd, _mm256_store_pd,
+            _mm256_add_pd, _mm256_broadcast_sd, _mm256_load_pd, _mm256_loadu_pd, _mm256_mul_pd,
+            _mm256_set_pd, _mm256_setzero_pd, _mm256_store_pd,
         };
         let (upper, x) = (self.upper.as_ptr(), x.as_ptr().cast::<f64>());
         for (row, out) in (first..).zip(out) {

@@ -83,9 +83,11 @@ impl ElementBuffers {
                     let per_element = corner_pairs(n).len();
                     let (mine, others) = blocks.split_at_mut(model.count() * per_element);
                     blocks = others;
-                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK * per_element)).for_each(|((chunk, f), c)| {
-                        model.linearise(range(chunk, f), x, v, linear, f, Couplings::Blocks(c));
-                    });
+                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK * per_element)).for_each(
+                        |((chunk, f), c)| {
+                            model.linearise(range(chunk, f), x, v, linear, f, Couplings::Blocks(c));
+                        },
+                    );
                 }
                 CouplingKind::Outer => {
                     let (mine, others) = outer.split_at_mut(model.count());

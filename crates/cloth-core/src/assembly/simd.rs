@@ -1,6 +1,11 @@
 //! Four lanes of f64: the instructions of the processor where it has AVX, plain arrays elsewhere. Both do the same operations
 //! in the same order without fused multiply–add, so they give the same bits.
 
+#![allow(
+    clippy::inline_always,
+    reason = "compiled once per instruction set: only inlined code has the caller's features"
+)]
+
 use super::Lanes;
 
 /// Four f64 that are added and multiplied lane by lane.

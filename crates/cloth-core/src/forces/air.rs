@@ -104,7 +104,8 @@ mod tests {
         Box::new(Air { wind, drag, lift, vertices: vec![[0, 1, 2]] })
     }
 
-    const TRIANGLE: [Vec3; 3] = [Vec3::new(0.0, 0.0, 0.0), Vec3::new(2.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];
+    const TRIANGLE: [Vec3; 3] =
+        [Vec3::new(0.0, 0.0, 0.0), Vec3::new(2.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0)];
 
     #[test]
     fn drag_and_lift_by_hand() {

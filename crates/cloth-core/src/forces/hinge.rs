@@ -28,6 +28,7 @@ use crate::{CoreError, Energy, mesh::Vec3, system::EffectInfo};
 const COLLAPSED: f64 = 1e-4;
 
 /// What a law answers at one curvature.
+#[allow(clippy::struct_field_names, reason = "the moment of a moment–curvature law is its moment")]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Moment {
     /// M: moment per width [N].
@@ -249,8 +250,9 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                     let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
                     let [v0, v1, v2, v3] = self.corners_of(element, v);
                     // Σ g_a = 0, so the rate needs differences only.
-                    let rate =
-                        gradient[1].dot(&(v1 - v0)) + gradient[2].dot(&(v2 - v0)) + gradient[3].dot(&(v3 - v0));
+                    let rate = gradient[1].dot(&(v1 - v0))
+                        + gradient[2].dot(&(v2 - v0))
+                        + gradient[3].dot(&(v3 - v0));
                     let answer = self.law.moment(element, (value - rest.angle) / rest.height);
                     let per_angle = rest.edge / rest.height;
                     // A negative slope has no place in a positive semi-definite block.
@@ -265,7 +267,9 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                 }
             }
             Couplings::Blocks(blocks) => {
-                for ((element, f), blocks) in range.zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6)) {
+                for ((element, f), blocks) in
+                    range.zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
+                {
                     let rest = &self.rest[element];
                     let corners = self.corners_of(element, x);
                     let velocity = self.corners_of(element, v);
@@ -331,7 +335,8 @@ mod tests {
 
     #[test]
     fn angle_is_signed_and_right_past_90_degrees() {
-        for degrees in [-179.0, -120.0, -90.0, -30.0, -1e-6, 0.0, 1e-6, 45.0, 90.0, 91.0, 150.0, 179.999_f64] {
+        for degrees in [-179.0, -120.0, -90.0, -30.0, -1e-6, 0.0, 1e-6, 45.0, 90.0, 91.0, 150.0, 179.999_f64]
+        {
             let theta = degrees.to_radians();
             let got = dihedral_angle(&folded(theta, [1.0, 0.7]));
             assert!((got - theta).abs() < 1e-12, "{degrees}: {got}");
@@ -398,6 +403,8 @@ mod tests {
         }
         let rest = vec![Rest::new(1.0, [1.0, 1.0], 0.0), Rest::new(1.0, [0.0, 0.0], 0.0)];
         let error = Hinges::new(LAW, vec![[0, 1, 2, 3], [4, 5, 6, 7]], rest).err();
-        assert!(matches!(error, Some(CoreError::Degenerate { element: 1, ref vertices, .. }) if vertices == &[4, 5, 6, 7]));
+        assert!(
+            matches!(error, Some(CoreError::Degenerate { element: 1, ref vertices, .. }) if vertices == &[4, 5, 6, 7])
+        );
     }
 }

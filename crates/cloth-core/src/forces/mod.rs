@@ -19,7 +19,6 @@ pub(crate) mod stretch_shear;
 #[cfg(test)]
 pub(crate) mod testing;
 
-
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};

@@ -209,8 +209,7 @@ mod tests {
 
     #[test]
     fn rest_has_no_energy_and_no_force() {
-        let model: Model =
-            Box::new(Springs::new(Role::Bending, 10.0, 0.1, vec![[0, 1]], vec![5.0]).unwrap());
+        let model: Model = Box::new(Springs::new(Role::Bending, 10.0, 0.1, vec![[0, 1]], vec![5.0]).unwrap());
         let x = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(4.0, 5.0, 0.0)];
         assert_eq!(energy(&model, &x), 0.0);
         assert_eq!(forces(&model, &x, &[Vec3::zeros(); 2]), [Vec3::zeros(); 2]);
@@ -220,8 +219,7 @@ mod tests {
     fn value_by_hand() {
         // Length 5, rest 4, k 10, k_d 2, u = (0.6, 0.8, 0), v_1 = (5, 0, 0): w·u = 3.
         // Tension 10·1 + 2·3 = 16, force on corner 0 = (9.6, 12.8, 0); energy ½·10·1² = 5.
-        let model: Model =
-            Box::new(Springs::new(Role::InPlane, 10.0, 2.0, vec![[0, 1]], vec![4.0]).unwrap());
+        let model: Model = Box::new(Springs::new(Role::InPlane, 10.0, 2.0, vec![[0, 1]], vec![4.0]).unwrap());
         let x = [Vec3::zeros(), Vec3::new(3.0, 4.0, 0.0)];
         let f = forces(&model, &x, &[Vec3::zeros(), Vec3::new(5.0, 0.0, 0.0)]);
         assert!((f[0] - Vec3::new(9.6, 12.8, 0.0)).norm() < 1e-13 && f[1] == -f[0]);
@@ -232,7 +230,10 @@ mod tests {
     fn collapsed_springs_stay_finite_and_bad_rest_lengths_are_named() {
         let f = forces(&fan(1.0), &[Vec3::zeros(); 4], &[Vec3::x(); 4]);
         assert!(f.iter().all(|f| *f == Vec3::zeros()));
-        let error = Springs::new(Role::InPlane, 1.0, 0.0, vec![[0, 1], [4, 7]], vec![1.0, 0.0]).err().unwrap();
-        assert!(matches!(error, CoreError::Degenerate { element: 1, ref vertices, .. } if vertices == &[4, 7]));
+        let error =
+            Springs::new(Role::InPlane, 1.0, 0.0, vec![[0, 1], [4, 7]], vec![1.0, 0.0]).err().unwrap();
+        assert!(
+            matches!(error, CoreError::Degenerate { element: 1, ref vertices, .. } if vertices == &[4, 7])
+        );
     }
 }

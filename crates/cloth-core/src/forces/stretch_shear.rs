@@ -197,9 +197,7 @@ impl ForceModel for StretchShear {
         let k = self.stiffness;
         // Factors of the outer products of constraint gradients, elastic and damping together.
         let along = linear.stiffness + linear.damping * k.damping;
-        for ((element, f), blocks) in
-            range.zip(forces.chunks_exact_mut(3)).zip(blocks.chunks_exact_mut(3))
-        {
+        for ((element, f), blocks) in range.zip(forces.chunks_exact_mut(3)).zip(blocks.chunks_exact_mut(3)) {
             let rest = &self.rest[element];
             let (wu, wv) = self.images(element, x);
             let (du, dv) = self.images(element, v);
@@ -221,8 +219,11 @@ impl ForceModel for StretchShear {
             let su = ku * (u.length - 1.0 + (k.damping + ahead * (1.0 - beta_u)) * rate_u);
             let sv = kv * (w.length - 1.0 + (k.damping + ahead * (1.0 - beta_v)) * rate_v);
             let ss = ks * (cs + damped * rate_s);
-            let (iu, iv, ic) =
-                (ahead * (ku * beta_u + ks * spread), ahead * (kv * beta_v + ks * spread), ahead * ks * cross);
+            let (iu, iv, ic) = (
+                ahead * (ku * beta_u + ks * spread),
+                ahead * (kv * beta_v + ks * spread),
+                ahead * ks * cross,
+            );
             let p_u = u.unit * su + wv * ss + du * iu + dv * ic;
             let p_v = w.unit * sv + wu * ss + dv * iv + du * ic;
             distribute(rest, &p_u, &p_v, f);
@@ -390,6 +391,8 @@ mod tests {
         let f = forces(&square(STIFFNESS), &[Vec3::zeros(); 4], &[Vec3::x(); 4]);
         assert!(f.iter().all(|f| f.iter().all(|c| c.is_finite())));
         let error = StretchShear::new(STIFFNESS, vec![[5, 6, 9]], &[[[1.0, 0.0], [0.0, 1.0]]], &[0.0]);
-        assert!(matches!(error.err(), Some(CoreError::Degenerate { element: 0, ref vertices, .. }) if vertices == &[5, 6, 9]));
+        assert!(
+            matches!(error.err(), Some(CoreError::Degenerate { element: 0, ref vertices, .. }) if vertices == &[5, 6, 9])
+        );
     }
 }

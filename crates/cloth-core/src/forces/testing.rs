@@ -145,7 +145,7 @@ fn blocks_by_differences(model: &Model, x: &[Vec3], v: &[Vec3], velocity: bool) 
             let before = *target;
             *target = before + offset;
             let f = flat(&forces(model, &x, &v));
-            if velocity { v[i][axis] = before } else { x[i][axis] = before }
+            *(if velocity { &mut v[i][axis] } else { &mut x[i][axis] }) = before;
             f
         };
         let column = -(at(STEP) - at(-STEP)) / (2.0 * STEP);
@@ -167,7 +167,10 @@ pub(crate) fn check_derivatives(model: &Model, x: &[Vec3], what: &str) {
     let (_, k) = linearised(model, x, &rest, &ELASTIC);
     let expected = blocks_by_differences(model, x, &rest, false);
     assert!(matrix_error(&k, &expected) < TOLERANCE, "{what}: blocks {:e}", matrix_error(&k, &expected));
-    assert!(matrix_error(&(&k * (1.0 + FAULT)), &expected) > TOLERANCE, "{what}: a fault in a block must be seen");
+    assert!(
+        matrix_error(&(&k * (1.0 + FAULT)), &expected) > TOLERANCE,
+        "{what}: a fault in a block must be seen"
+    );
     assert!((&k - k.transpose()).amax() <= ROUNDING * k.amax(), "{what}: symmetric");
 
     let linear = Linear { psd: Psd::Projected, ..ELASTIC };
@@ -194,11 +197,11 @@ pub(crate) fn check_velocity_terms(model: &Model, x: &[Vec3], v: &[Vec3], what: 
 /// Forces and moments sum to zero, with velocities too.
 pub(crate) fn check_momentum(model: &Model, x: &[Vec3], v: &[Vec3], what: &str) {
     let f = forces(model, x, v);
-    let size: f64 = f.iter().map(|f| f.norm()).sum();
+    let size: f64 = f.iter().map(Vec3::norm).sum();
     assert!(size > 0.0, "{what}: there must be forces");
     let sum: Vec3 = f.iter().sum();
     let moment: Vec3 = x.iter().zip(&f).map(|(x, f)| x.cross(f)).sum();
-    let reach = x.iter().map(|x| x.norm()).fold(0.0, f64::max);
+    let reach = x.iter().map(Vec3::norm).fold(0.0, f64::max);
     assert!(sum.norm() < ROUNDING * size, "{what}: force {sum:?}");
     assert!(moment.norm() < ROUNDING * size * reach, "{what}: moment {moment:?}");
     let mut faulty = f.clone();

@@ -120,10 +120,9 @@ impl Integrator {
         params: IntegratorParams,
         pool: Arc<rayon::ThreadPool>,
     ) -> Result<Self, CoreError> {
-        for (name, got) in [
-            ("solver.tolerance", params.solver.tolerance),
-            ("newton_tolerance", params.newton_tolerance),
-        ] {
+        for (name, got) in
+            [("solver.tolerance", params.solver.tolerance), ("newton_tolerance", params.newton_tolerance)]
+        {
             if !(got.is_finite() && got > 0.0) {
                 return Err(CoreError::Parameter { name, expected: "a value > 0", got });
             }

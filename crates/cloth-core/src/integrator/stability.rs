@@ -44,7 +44,8 @@ pub(super) fn stable_step(system: &ClothSystem, method: Method, x: &[Vec3], v: &
     let mut step = f64::INFINITY;
     for matrix in [&stiffness, &damping] {
         for q in ritz_vectors(matrix, &scale) {
-            let mode = Mode { squared: rayleigh(&stiffness, &scale, &q), rate: rayleigh(&damping, &scale, &q) };
+            let mode =
+                Mode { squared: rayleigh(&stiffness, &scale, &q), rate: rayleigh(&damping, &scale, &q) };
             step = step.min(mode.largest_step(method));
         }
     }
@@ -174,10 +175,12 @@ mod tests {
         assert!((step * omega - 8f64.sqrt()).abs() < TOLERANCE * 3.0, "{step}");
         // Explicit Euler with stiffness-proportional damping β = d ω²: dt = d while underdamped.
         let d = 2e-4;
-        let step = Mode { squared: omega * omega, rate: d * omega * omega }.largest_step(Method::ExplicitEuler);
+        let step =
+            Mode { squared: omega * omega, rate: d * omega * omega }.largest_step(Method::ExplicitEuler);
         assert!((step / d - 1.0).abs() < 0.02, "{step}");
         // Pure decay: 2/β for Euler and midpoint, 2.785/β for RK4.
-        for (method, limit) in [(Method::ExplicitEuler, 2.0), (Method::Midpoint, 2.0), (Method::Rk4, 2.7853)] {
+        for (method, limit) in [(Method::ExplicitEuler, 2.0), (Method::Midpoint, 2.0), (Method::Rk4, 2.7853)]
+        {
             let step = Mode { squared: 0.0, rate: 500.0 }.largest_step(method);
             assert!((step * 500.0 / limit - 1.0).abs() < 5.0 * TOLERANCE, "{method:?} {step}");
         }

@@ -44,7 +44,9 @@ pub enum InPlane {
 }
 
 /// Out-of-plane law.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 #[serde(tag = "model", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Bending {
     /// No resistance to bending.
@@ -86,10 +88,10 @@ impl Material {
             });
         }
         let not_negative = |values: &[(&'static str, &'static str, f64)]| {
-            values.iter().find(|(_, _, got)| !(got.is_finite() && *got >= 0.0)).map_or(
-                Ok(()),
-                |&(name, expected, got)| Err(CoreError::Parameter { name, expected, got }),
-            )
+            values
+                .iter()
+                .find(|(_, _, got)| !(got.is_finite() && *got >= 0.0))
+                .map_or(Ok(()), |&(name, expected, got)| Err(CoreError::Parameter { name, expected, got }))
         };
         match self.in_plane {
             InPlane::Spring { stiffness, damping } => not_negative(&[

@@ -14,7 +14,7 @@ use faer::{
 
 use super::{
     SolveError, SolveInfo,
-    pcg::{apply, invert},
+    blocks::{apply, invert},
     scalar::{Part, Scalar, eliminated, scatter},
 };
 use crate::{
@@ -77,7 +77,8 @@ impl LinOp<f64> for Jacobi {
     fn apply(&self, mut out: MatMut<'_, f64>, rhs: MatRef<'_, f64>, _par: Par, _stack: &mut MemStack) {
         for column in 0..rhs.ncols() {
             for (i, block) in self.0.iter().enumerate() {
-                let r = Lanes([rhs[(3 * i, column)], rhs[(3 * i + 1, column)], rhs[(3 * i + 2, column)], 0.0]);
+                let r =
+                    Lanes([rhs[(3 * i, column)], rhs[(3 * i + 1, column)], rhs[(3 * i + 2, column)], 0.0]);
                 let z = apply(block, &r);
                 for l in 0..3 {
                     out[(3 * i + l, column)] = z.0[l];
@@ -104,7 +105,10 @@ impl FaerCg {
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.scalar.bytes() + size_of_val(self.jacobi.0.as_slice()) + 16 * self.rhs.nrows() + self.buffer.len()
+        self.scalar.bytes()
+            + size_of_val(self.jacobi.0.as_slice())
+            + 16 * self.rhs.nrows()
+            + self.buffer.len()
     }
 
     pub(crate) fn solve(
@@ -130,11 +134,13 @@ impl FaerCg {
         if !first.is_finite() {
             return Err(SolveError::NotFinite { iteration: 0, value: first });
         }
-        let mut params = CgParams::default();
         // `Zero` would leave the residual uninitialised (faer 0.24.4).
-        params.initial_guess = InitialGuessStatus::MaybeNonZero;
-        params.rel_tolerance = tolerance;
-        params.max_iters = max_iterations;
+        let params = CgParams {
+            initial_guess: InitialGuessStatus::MaybeNonZero,
+            rel_tolerance: tolerance,
+            max_iters: max_iterations,
+            ..CgParams::default()
+        };
         self.solution.fill(0.0);
         let operator = Operator(&self.scalar.matrix);
         let result = conjugate_gradient(

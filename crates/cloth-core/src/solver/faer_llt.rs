@@ -3,7 +3,7 @@
 //! One thread: the supernodal loop is sequential and cloth fronts are too small to gain from parallel dense kernels.
 
 use faer::{
-    Conj, Mat, Par, Side,
+    Conj, Mat, Par, Side, Spec,
     dyn_stack::{MemBuffer, MemStack},
     linalg::cholesky::llt::factor::{LltError, LltRegularization},
     sparse::linalg::cholesky::{
@@ -42,13 +42,21 @@ impl FaerLlt {
         )
         .ok();
         let n = 3 * pattern.rows;
-        let (length, buffer) = symbolic.as_ref().map_or((0, MemBuffer::new(faer::dyn_stack::StackReq::EMPTY)), |s| {
-            let need = s
-                .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default())
-                .or(s.solve_in_place_scratch::<f64>(1, Par::Seq));
-            (s.len_val(), MemBuffer::new(need))
-        });
-        Self { scalar, symbolic, values: vec![0.0; length], rhs: Mat::zeros(n, 1), residual: vec![0.0; n], buffer }
+        let (length, buffer) =
+            symbolic.as_ref().map_or((0, MemBuffer::new(faer::dyn_stack::StackReq::EMPTY)), |s| {
+                let need = s
+                    .factorize_numeric_llt_scratch::<f64>(Par::Seq, Spec::default())
+                    .or(s.solve_in_place_scratch::<f64>(1, Par::Seq));
+                (s.len_val(), MemBuffer::new(need))
+            });
+        Self {
+            scalar,
+            symbolic,
+            values: vec![0.0; length],
+            rhs: Mat::zeros(n, 1),
+            residual: vec![0.0; n],
+            buffer,
+        }
     }
 
     pub(crate) fn bytes(&self) -> usize {
@@ -83,13 +91,18 @@ impl FaerLlt {
                 LltRegularization::default(),
                 Par::Seq,
                 MemStack::new(&mut self.buffer),
-                Default::default(),
+                Spec::default(),
             )
             .map_err(|LltError::NonPositivePivot { index }| SolveError::NotPositiveDefinite {
                 iteration: index,
                 curvature: f64::NAN,
             })?;
-        factor.solve_in_place_with_conj(Conj::No, self.rhs.as_mut(), Par::Seq, MemStack::new(&mut self.buffer));
+        factor.solve_in_place_with_conj(
+            Conj::No,
+            self.rhs.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut self.buffer),
+        );
         scatter(self.rhs.col_as_slice(0), pinned, x);
         let residual = residual_norm(a, b, pinned, x) / first;
         Ok(SolveInfo { iterations: 0, residual, converged: residual <= tolerance })
@@ -106,5 +119,9 @@ fn residual_norm(a: &BlockMatrix, b: &[Vec3], pinned: &[bool], x: &[Vec3]) -> f6
     let lanes: Vec<Lanes> = x.iter().map(Lanes::from_vec).collect();
     let mut product = vec![Lanes::ZERO; x.len()];
     a.multiply_rows(0, &lanes, &mut product);
-    (0..x.len()).filter(|&i| !pinned[i]).map(|i| (b[i] - product[i].to_vec()).norm_squared()).sum::<f64>().sqrt()
+    (0..x.len())
+        .filter(|&i| !pinned[i])
+        .map(|i| (b[i] - product[i].to_vec()).norm_squared())
+        .sum::<f64>()
+        .sqrt()
 }

@@ -3,7 +3,8 @@
 //! All three solve the same system: prescribed vertices are eliminated, A_ff x_f = b_f − A_fp x_p, and residuals are
 //! those of that system relative to its right-hand side.
 
-mod coarse;
+mod band;
+mod blocks;
 mod faer_cg;
 mod faer_llt;
 mod ordering;
@@ -66,7 +67,9 @@ pub struct SolveInfo {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SolveError {
     /// A direction of non-positive curvature was met, or a pivot was not positive.
-    #[error("linear solver: expected a positive definite matrix, iteration {iteration} found curvature {curvature:e}")]
+    #[error(
+        "linear solver: expected a positive definite matrix, iteration {iteration} found curvature {curvature:e}"
+    )]
     NotPositiveDefinite {
         /// Iteration, or index of the scalar row for a factorisation.
         iteration: usize,

@@ -91,11 +91,11 @@ impl Graph {
     }
 
     /// At most `limit` compact aggregates (more if the graph has more pieces): the aggregate of every vertex, and their
-    /// number. Seeds are as many hops apart as it takes; every vertex joins its nearest seed.
-    pub(super) fn aggregates(&self, limit: usize) -> (Vec<u32>, usize) {
+    /// number. Seeds are as many hops apart as it takes, found along `order`; every vertex joins its nearest seed.
+    pub(super) fn aggregates(&self, order: &[u32], limit: usize) -> (Vec<u32>, usize) {
         let mut seeds = Vec::new();
         for hops in 1..=64 {
-            seeds = self.seeds(hops);
+            seeds = self.seeds(order, hops);
             if seeds.len() <= limit {
                 break;
             }
@@ -120,13 +120,13 @@ impl Graph {
     }
 
     /// Vertices more than `hops` edges apart from each other that leave none farther than that from the nearest.
-    fn seeds(&self, hops: usize) -> Vec<u32> {
+    fn seeds(&self, order: &[u32], hops: usize) -> Vec<u32> {
         let mut covered = vec![false; self.len()];
         let mut stamp = vec![u32::MAX; self.len()];
         let mut seeds = Vec::new();
         let mut ring = Vec::new();
         let mut next = Vec::new();
-        for vertex in 0..self.len() {
+        for vertex in order.iter().map(|&v| v as usize) {
             if covered[vertex] {
                 continue;
             }

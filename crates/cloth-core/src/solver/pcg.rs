@@ -8,7 +8,10 @@
 
 use rayon::prelude::*;
 
-use super::{SolveError, SolveInfo};
+use super::{
+    SolveError, SolveInfo,
+    blocks::{apply, determinant, invert},
+};
 use crate::{
     assembly::{BlockMatrix, Lanes, ROWS_PER_CHUNK},
     mesh::Vec3,
@@ -66,7 +69,10 @@ impl Pcg {
             return Err(SolveError::NotFinite { iteration: 0, value: rr });
         }
         if let Some(row) = bad {
-            return Err(SolveError::NotPositiveDefinite { iteration: 0, curvature: determinant(&a.diagonal[row]) });
+            return Err(SolveError::NotPositiveDefinite {
+                iteration: 0,
+                curvature: determinant(&a.diagonal[row]),
+            });
         }
         let first = rr.sqrt();
         let mut info = SolveInfo { iterations: 0, residual: 0.0, converged: true };
@@ -202,32 +208,4 @@ impl Pcg {
                 *partial = sums;
             });
     }
-}
-
-/// Block times vector.
-#[inline]
-pub(crate) fn apply(block: &[f64; 9], v: &Lanes) -> Lanes {
-    let mut out = [0.0; 4];
-    for r in 0..3 {
-        out[r] = (block[r] * v.0[0] + block[3 + r] * v.0[1]) + block[6 + r] * v.0[2];
-    }
-    Lanes(out)
-}
-
-fn determinant(m: &[f64; 9]) -> f64 {
-    m[0] * (m[4] * m[8] - m[5] * m[7]) - m[3] * (m[1] * m[8] - m[2] * m[7])
-        + m[6] * (m[1] * m[5] - m[2] * m[4])
-}
-
-/// Inverse of a symmetric positive definite block; none if a leading minor is not positive.
-pub(crate) fn invert(m: &[f64; 9]) -> Option<[f64; 9]> {
-    let minor = m[0] * m[4] - m[1] * m[3];
-    let det = determinant(m);
-    if !(m[0] > 0.0 && minor > 0.0 && det > 0.0) {
-        return None;
-    }
-    let s = 1.0 / det;
-    let (a, b, c) = (m[4] * m[8] - m[5] * m[7], m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4]);
-    let (d, e, f) = (m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5], minor);
-    Some([s * a, s * b, s * c, s * b, s * d, s * e, s * c, s * e, s * f])
 }
