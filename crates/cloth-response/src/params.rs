@@ -34,7 +34,7 @@ impl Default for ResponseParams {
             friction: FrictionRule::default(),
             max_passes: 6,
             max_zone_passes: 8,
-            max_sweeps: 30,
+            max_sweeps: 15,
             velocity_tolerance: 1e-6,
             allow_initial_contacts: false,
         }

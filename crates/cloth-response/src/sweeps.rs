@@ -69,7 +69,10 @@ impl ContactSet {
         }
         let mut budget = (max_sweeps * count).max(FREE_LOOKS);
         let mut last_norm = 0.0;
-        while count > 0 {
+        if count == 0 {
+            return info;
+        }
+        loop {
             let mut sweep = Sweep { looks: 0, residual: 0.0, norm: 0.0 };
             if info.sweeps % 2 == 0 {
                 (0..count).for_each(|i| self.relax_one(i, motion, tolerance, &mut sweep));

@@ -124,14 +124,9 @@ impl Zone {
         }
         let mut ridden: Vec<_> = self.ties.iter().map(|&v| frames.of(v, detection.mesh, motion, h)).collect();
         ridden.dedup();
-        match ridden[..] {
-            [frame] => *frames.map(frame),
-            // A deforming collider, or several: the nearest rigid motion, judged by the detection.
-            _ => {
-                let frame = frames.of_patch(&self.ties, motion);
-                *frames.map(frame)
-            }
-        }
+        // A deforming collider, or several: the nearest rigid motion, judged by the detection.
+        let frame = if let [frame] = ridden[..] { frame } else { frames.of_patch(&self.ties, motion) };
+        *frames.map(frame)
     }
 }
 

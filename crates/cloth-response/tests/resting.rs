@@ -1,5 +1,7 @@
 //! Cloth on planes: landing, rest, friction on a slope.
 
+#![allow(clippy::unwrap_used, reason = "a failure here is a failure of the test")]
+
 mod support;
 
 use cloth_response::collision::StencilKind;
