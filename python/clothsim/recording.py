@@ -282,6 +282,8 @@ class FrameWriter:
         try:
             self._rows.write(np.ascontiguousarray(positions, dtype="<f8").tobytes())
             self._lines.write(json.dumps(facts).encode() + b"\n")
+            self._rows.flush()
+            self._lines.flush()
         except OSError as error:
             raise output_error(self._rows_path, error) from error
         self.frames += 1

@@ -28,8 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--device", default="auto", help="where to detect collisions: cpu or auto (default)")
     parser.add_argument("--frames", metavar="N", type=_count, help="stop after N frames (default: the whole duration)")
+    parser.add_argument(
+        "--allow-intersections",
+        action="store_true",
+        help="run from a start state in which triangles pass through others",
+    )
     mode = parser.add_mutually_exclusive_group()
-    mode.add_argument("--resume", action="store_true", help="go on with an unfinished run in OUT")
+    mode.add_argument("--resume", action="store_true", help="go on with an unfinished run in OUT, or start one")
     mode.add_argument("--overwrite", action="store_true", help="replace a run that OUT holds")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
@@ -53,6 +58,7 @@ def execute(options: argparse.Namespace) -> int:
         threads=check_threads(options.threads),
         device=options.device,
         frames=options.frames,
+        allow_intersections=options.allow_intersections,
         resume=options.resume,
         overwrite=options.overwrite,
         progress=not (options.quiet or options.json),

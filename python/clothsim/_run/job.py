@@ -53,6 +53,8 @@ class Job:
         Where to detect collisions.
     frames : int or None
         Stop after so many frames.
+    allow_intersections : bool
+        Run from a start with intersections, even if the scene does not say so.
     resume, overwrite : bool
         What to do with a run that is there already.
     progress : bool
@@ -64,6 +66,7 @@ class Job:
     threads: int | None = None
     device: str = "auto"
     frames: int | None = None
+    allow_intersections: bool = False
     resume: bool = False
     overwrite: bool = False
     progress: bool = True
@@ -108,7 +111,7 @@ class Job:
         return None
 
     def _new_simulation(self) -> Simulation:
-        return Simulation(self.scene, self.threads, self.device)
+        return Simulation(self.scene, self.threads, self.device, allow_intersections=self.allow_intersections)
 
     def _run(self, folder: RunFolder, settings: dict[str, Any], simulation: Simulation | None) -> dict[str, Any]:
         fingerprint = digest(self.scene)
