@@ -48,6 +48,10 @@ impl MovingBox {
 
     /// Whether the boxes may touch at some time (closed).
     #[inline]
+    #[allow(
+        clippy::needless_bitwise_bool,
+        reason = "a branch per comparison costs more than the comparisons"
+    )]
     pub(crate) fn overlaps(&self, other: &Self) -> bool {
         let mut apart = false;
         for axis in 0..3 {

@@ -54,6 +54,15 @@ impl CollisionMesh {
     /// # Errors
     /// [`DetectError::IndexOutOfRange`], [`DetectError::RepeatedVertex`], [`DetectError::TooLarge`].
     pub fn new(bodies: &[(Body, usize, &[[u32; 3]])]) -> Result<Self, DetectError> {
+        Self::assemble(bodies, true)
+    }
+
+    /// [`CollisionMesh::single`] without edges and owners: enough to pair triangles.
+    pub(crate) fn surface(vertex_count: usize, triangles: &[[u32; 3]]) -> Result<Self, DetectError> {
+        Self::assemble(&[(Body { dynamic: true, self_collision: true }, vertex_count, triangles)], false)
+    }
+
+    fn assemble(bodies: &[(Body, usize, &[[u32; 3]])], with_features: bool) -> Result<Self, DetectError> {
         let limit = NONE as usize;
         let vertex_count: usize = bodies.iter().map(|b| b.1).sum();
         let triangle_count: usize = bodies.iter().map(|b| b.2.len()).sum();
@@ -82,27 +91,35 @@ impl CollisionMesh {
             }
             vertex_body.resize(vertex_body.len() + count, b as u32);
         }
-        let Topology { edges, triangle_edges, .. } = Topology::new(vertex_count, &triangles);
-        let mut vertex_owner = vec![NONE; vertex_count];
-        let mut edge_owner = vec![NONE; edges.len()];
-        for t in (0..triangles.len()).rev() {
-            for k in 0..3 {
-                vertex_owner[triangles[t][k] as usize] = t as u32;
-                edge_owner[triangle_edges[t][k] as usize] = t as u32;
-            }
-        }
-        Ok(Self {
+        let mut mesh = Self {
             vertex_count,
             triangles,
-            edges,
-            triangle_edges,
+            edges: vec![],
+            triangle_edges: vec![],
             vertex_body,
             bodies: bodies.iter().map(|b| b.0).collect(),
             attached_to: vec![NONE; vertex_count],
-            vertex_owner,
-            edge_owner,
+            vertex_owner: vec![],
+            edge_owner: vec![],
             has_attachments: false,
-        })
+        };
+        if with_features {
+            mesh.find_features();
+        }
+        Ok(mesh)
+    }
+
+    fn find_features(&mut self) {
+        let Topology { edges, triangle_edges, .. } = Topology::new(self.vertex_count, &self.triangles);
+        self.vertex_owner = vec![NONE; self.vertex_count];
+        self.edge_owner = vec![NONE; edges.len()];
+        for t in (0..self.triangles.len()).rev() {
+            for k in 0..3 {
+                self.vertex_owner[self.triangles[t][k] as usize] = t as u32;
+                self.edge_owner[triangle_edges[t][k] as usize] = t as u32;
+            }
+        }
+        (self.edges, self.triangle_edges) = (edges, triangle_edges);
     }
 
     /// Declares that `vertex` is held by `body`: features with this vertex are not tested against that body.

@@ -14,7 +14,7 @@ pub fn self_intersections(
     vertices: &[Vec3],
     pool: &rayon::ThreadPool,
 ) -> Result<Vec<[u32; 2]>, DetectError> {
-    intersections(&CollisionMesh::single(vertices.len(), triangles)?, vertices, pool)
+    intersections(&CollisionMesh::surface(vertices.len(), triangles)?, vertices, pool)
 }
 
 /// Pairs of triangles (lower, higher) at `x` \[m\] that pass through each other, under the rules of bodies, sorted.
@@ -38,59 +38,65 @@ pub fn intersections(
     Bvh::new(mesh, x)?.intersections(mesh, x, pool)
 }
 
-/// Whether two triangles without a common vertex meet: a side of one and the other have a common point.
-pub(crate) fn triangles_meet(first: [u32; 3], second: [u32; 3], x: &[Vec3]) -> bool {
-    let sides = |t: [u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
-    sides(first).iter().any(|&side| side_meets(side, second, x))
-        || sides(second).iter().any(|&side| side_meets(side, first, x))
+/// Whether two closed triangles have a common point (through a side of one of them; see [`intersections`]).
+pub(crate) fn triangles_meet(first: &[Vec3; 3], second: &[Vec3; 3]) -> bool {
+    let (over_second, over_first) = (heights(second, first), heights(first, second));
+    if on_one_side(&over_second) || on_one_side(&over_first) {
+        return false;
+    }
+    [(first, second, over_second), (second, first, over_first)].iter().any(|(one, other, heights)| {
+        [(0, 1), (1, 2), (2, 0)]
+            .iter()
+            .any(|&(i, j)| side_meets(&[one[i], one[j]], [heights[i], heights[j]], other))
+    })
 }
 
 /// Whether a closed segment and a closed triangle have a common point.
-pub(crate) fn side_meets(side: [u32; 2], triangle: [u32; 3], x: &[Vec3]) -> bool {
-    let target = Target { corners: triangle.map(|v| x[v as usize]) };
-    target.meets(&x[side[0] as usize], &x[side[1] as usize])
+pub(crate) fn segment_meets_triangle(segment: &[Vec3; 2], triangle: &[Vec3; 3]) -> bool {
+    side_meets(segment, heights(triangle, segment), triangle)
 }
 
-struct Target {
-    corners: [Vec3; 3],
+/// On which side of the triangle's plane each point lies.
+fn heights<const N: usize>(triangle: &[Vec3; 3], points: &[Vec3; N]) -> [f64; N] {
+    let [a, b, c] = triangle.map(coord3);
+    points.map(|p| orient3d(a, b, c, coord3(p)))
 }
 
-impl Target {
-    fn meets(&self, p: &Vec3, q: &Vec3) -> bool {
-        let [a, b, c] = self.corners.map(coord3);
-        let (p3, q3) = (coord3(*p), coord3(*q));
-        let (above_p, above_q) = (orient3d(a, b, c, p3), orient3d(a, b, c, q3));
-        if (above_p > 0.0 && above_q > 0.0) || (above_p < 0.0 && above_q < 0.0) {
-            return false;
-        }
-        if above_p == 0.0 && above_q == 0.0 {
-            return self.meets_in_plane(p, q);
-        }
-        let turns = [orient3d(p3, q3, a, b), orient3d(p3, q3, b, c), orient3d(p3, q3, c, a)];
-        turns.iter().all(|&t| t >= 0.0) || turns.iter().all(|&t| t <= 0.0)
-    }
+fn on_one_side(heights: &[f64]) -> bool {
+    heights.iter().all(|&h| h > 0.0) || heights.iter().all(|&h| h < 0.0)
+}
 
-    /// A segment in the triangle's plane, seen along an axis along which the triangle keeps an area.
-    fn meets_in_plane(&self, p: &Vec3, q: &Vec3) -> bool {
-        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-            let flat = |v: &Vec3| Coord { x: v[i], y: v[j] };
-            let [a, b, c] = [0, 1, 2].map(|k| flat(&self.corners[k]));
-            let area = orient2d(a, b, c);
-            if area == 0.0 {
-                continue;
-            }
-            let (p, q) = (flat(p), flat(q));
-            let outside = |r, s, t| orient2d(r, s, t) * area.signum() < 0.0;
-            // Beyond one side, or all of the triangle on one side of the segment: apart; two convex sets in a plane
-            // are apart only along a side of either. A segment of no length is a point: only its sides count.
-            let beyond_side =
-                [(a, b), (b, c), (c, a)].iter().any(|&(r, s)| outside(r, s, p) && outside(r, s, q));
-            let turns = [orient2d(p, q, a), orient2d(p, q, b), orient2d(p, q, c)];
-            let beside = turns.iter().all(|&t| t > 0.0) || turns.iter().all(|&t| t < 0.0);
-            return !beyond_side && !beside;
-        }
-        false
+fn side_meets(segment: &[Vec3; 2], heights: [f64; 2], triangle: &[Vec3; 3]) -> bool {
+    if on_one_side(&heights) {
+        return false;
     }
+    if heights == [0.0, 0.0] {
+        return meets_in_plane(segment, triangle);
+    }
+    let ([p, q], [a, b, c]) = (segment.map(coord3), triangle.map(coord3));
+    let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
+    turns.iter().all(|&t| t >= 0.0) || turns.iter().all(|&t| t <= 0.0)
+}
+
+/// A segment in the triangle's plane, seen along an axis along which the triangle keeps an area.
+fn meets_in_plane(segment: &[Vec3; 2], triangle: &[Vec3; 3]) -> bool {
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        let flat = |v: &Vec3| Coord { x: v[i], y: v[j] };
+        let [a, b, c] = [0, 1, 2].map(|k| flat(&triangle[k]));
+        let area = orient2d(a, b, c);
+        if area == 0.0 {
+            continue;
+        }
+        let (p, q) = (flat(&segment[0]), flat(&segment[1]));
+        let outside = |r, s, t| orient2d(r, s, t) * area.signum() < 0.0;
+        // Beyond one side, or all of the triangle on one side of the segment: apart; two convex sets in a plane
+        // are apart only along a side of either. A segment of no length is a point: only its sides count.
+        let beyond_side = [(a, b), (b, c), (c, a)].iter().any(|&(r, s)| outside(r, s, p) && outside(r, s, q));
+        let turns = [orient2d(p, q, a), orient2d(p, q, b), orient2d(p, q, c)];
+        let beside = turns.iter().all(|&t| t > 0.0) || turns.iter().all(|&t| t < 0.0);
+        return !beyond_side && !beside;
+    }
+    false
 }
 
 fn coord3(v: Vec3) -> Coord3D<f64> {

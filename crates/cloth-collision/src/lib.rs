@@ -7,6 +7,15 @@
 //!
 //! Lengths are in metres, times are fractions of the step in \[0, 1\].
 
+#![allow(
+    clippy::inline_always,
+    reason = "arithmetic in lanes must land in the function that enables the instructions"
+)]
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "what is not a number must fall on the safe side: the negation of the comparison that would reject"
+)]
+
 pub use cloth_mesh as mesh;
 
 pub mod ccd;

@@ -145,7 +145,9 @@ fn outward((points, mut triangles): (Vec<parry3d_f64::math::Vector>, Vec<[u32; 3
         })
         .sum();
     if six_volumes < 0.0 {
-        triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        for triangle in &mut triangles {
+            triangle.swap(1, 2);
+        }
     }
     TriMesh { vertices, triangles, uv: None }
 }

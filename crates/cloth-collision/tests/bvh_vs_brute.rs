@@ -1,4 +1,5 @@
 //! The tree finds exactly what testing every pair finds.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod support;
 

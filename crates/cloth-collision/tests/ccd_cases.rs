@@ -1,4 +1,5 @@
 //! Single pairs: named degenerate cases, and times against dense sampling.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod support;
 
@@ -51,9 +52,13 @@ fn vertex_triangle_cases() -> Vec<(&'static str, [Vec3; 8], Option<f64>)> {
         ("at rest, beside, in the plane", moving(with(v(3.0, 0.0, 3.0)), [O; 4]), None),
         ("at rest on the face", moving(with(v(1.0, 0.0, 1.0)), [O; 4]), Some(0.0)),
         ("at rest on a corner", moving(with(tri[1]), [O; 4]), Some(0.0)),
-        ("moves together, apart", moving(with(v(1.0, 0.0078125, 1.0)), [v(64.0, -8.0, 32.0); 4]), None),
-        ("teleport through", moving(with(v(1.0, 524288.0, 1.0)), only(v(0.0, -1048576.0, 0.0))), Some(0.5)),
-        ("teleport past", moving(with(v(-0.0625, 524288.0, 1.0)), only(v(0.0, -1048576.0, 0.0))), None),
+        ("moves together, apart", moving(with(v(1.0, 0.007_812_5, 1.0)), [v(64.0, -8.0, 32.0); 4]), None),
+        (
+            "teleport through",
+            moving(with(v(1.0, 524_288.0, 1.0)), only(v(0.0, -1_048_576.0, 0.0))),
+            Some(0.5),
+        ),
+        ("teleport past", moving(with(v(-0.0625, 524_288.0, 1.0)), only(v(0.0, -1_048_576.0, 0.0))), None),
         (
             "triangle sweeps over the vertex",
             moving(with(v(1.0, 1.0, 1.0)), [O, v(0.0, 4.0, 0.0), v(0.0, 4.0, 0.0), v(0.0, 4.0, 0.0)]),
@@ -168,12 +173,12 @@ fn edge_edge_cases() -> Vec<(&'static str, [Vec3; 8], Option<f64>)> {
         ),
         (
             "moves together",
-            moving(with(v(0.0, 0.0078125, -2.0), v(0.0, 0.0078125, 2.0)), [v(64.0, 8.0, -32.0); 4]),
+            moving(with(v(0.0, 0.007_812_5, -2.0), v(0.0, 0.007_812_5, 2.0)), [v(64.0, 8.0, -32.0); 4]),
             None,
         ),
         (
             "teleport through",
-            moving(with(v(0.0, 524288.0, -2.0), v(0.0, 524288.0, 2.0)), second(v(0.0, -1048576.0, 0.0))),
+            moving(with(v(0.0, 524_288.0, -2.0), v(0.0, 524_288.0, 2.0)), second(v(0.0, -1_048_576.0, 0.0))),
             Some(0.5),
         ),
         (
@@ -289,6 +294,7 @@ fn times_at_a_thickness_agree_with_dense_sampling() {
 
 #[test]
 fn times_of_thin_contacts_agree_with_sign_changes() {
+    const SAMPLES: usize = 1000;
     // A sign change of the volume at which the point is well inside is a contact; the first one bounds the time.
     let volume_vt = |p: &[Vec3; 4]| (p[1] - p[0]).cross(&(p[2] - p[0])).dot(&(p[3] - p[0]));
     let volume_ee = |p: &[Vec3; 4]| (p[1] - p[0]).cross(&(p[3] - p[2])).dot(&(p[2] - p[0]));
@@ -301,7 +307,6 @@ fn times_of_thin_contacts_agree_with_sign_changes() {
         let distance =
             |t: f64| if vt { distance_vertex_triangle(&at(&p, t)) } else { distance_edge_edge(&at(&p, t)) };
         let mut first = None;
-        const SAMPLES: usize = 1000;
         for k in 0..SAMPLES {
             let (mut lo, mut hi) = (k as f64 / SAMPLES as f64, (k + 1) as f64 / SAMPLES as f64);
             let sign = volume(lo).signum();

@@ -1,4 +1,5 @@
 //! Closest points against brute sampling, in every region, and for degenerate shapes.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod support;
 

@@ -1,4 +1,5 @@
 //! Pairs within a distance: complete, right, once each.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 mod support;
 

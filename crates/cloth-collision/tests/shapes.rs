@@ -1,4 +1,5 @@
 //! Tessellated shapes: closed, outward, within their tolerance.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use cloth_collision::DetectError;
 use cloth_collision::distance::vertex_triangle::closest_point;

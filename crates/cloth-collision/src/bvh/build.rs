@@ -104,8 +104,10 @@ fn push_leaf(mesh: &CollisionMesh, node: u32, items: &mut [Item], tree: &mut Tre
     for (lane, item) in items.iter().enumerate() {
         let t = item.triangle;
         triangles[lane] = t;
+        // A mesh without features has no owners: its leaves hold triangles only.
+        let Some(sides) = mesh.triangle_edges.get(t as usize) else { continue };
         for k in 0..3 {
-            let (v, e) = (mesh.triangles[t as usize][k], mesh.triangle_edges[t as usize][k]);
+            let (v, e) = (mesh.triangles[t as usize][k], sides[k]);
             if mesh.vertex_owner[v as usize] == t {
                 vertices.push(v);
             }

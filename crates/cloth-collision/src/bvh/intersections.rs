@@ -2,8 +2,8 @@
 
 use super::traverse::{LeafPairs, Visit};
 use super::{Bvh, leaf_pair};
-use crate::ccd::filter::{filter, four_segment_triangles_apart, four_triangles_apart, put};
-use crate::intersect::{side_meets, triangles_meet};
+use crate::ccd::filter::{Row, filter, four_segment_triangles_apart, four_triangles_apart, row};
+use crate::intersect::{segment_meets_triangle, triangles_meet};
 use crate::{CollisionMesh, DetectError, Mode, Query, Vec3};
 use cloth_mesh::NONE;
 
@@ -22,9 +22,11 @@ impl Bvh {
         query.check(mesh)?;
         self.check_mesh(mesh)?;
         self.refit(mesh, &query, pool);
+        let rows: Vec<Row> = x.iter().map(row).collect();
         let (visits, _) = self.traverse(mesh, pool, || Meetings {
             mesh,
             x,
+            rows: &rows,
             waiting: vec![],
             strangers: vec![],
             sides: vec![],
@@ -41,6 +43,7 @@ impl Bvh {
 struct Meetings<'a> {
     mesh: &'a CollisionMesh,
     x: &'a [Vec3],
+    rows: &'a [Row],
     waiting: Vec<[u32; 2]>,
     /// Pairs of triangles without a common vertex.
     strangers: Vec<[u32; 2]>,
@@ -49,9 +52,10 @@ struct Meetings<'a> {
     found: Vec<[u32; 2]>,
 }
 
+#[derive(Debug, Clone, Copy)]
 struct Side {
     pair: [u32; 2],
-    side: [u32; 2],
+    ends: [u32; 2],
     triangle: [u32; 3],
 }
 
@@ -60,33 +64,34 @@ const FLUSH: usize = 1024;
 
 impl Meetings<'_> {
     fn flush(&mut self) {
-        let Self { mesh, x, strangers, sides, found, .. } = self;
+        let Self { mesh, x, rows, strangers, sides, found, .. } = self;
+        let row = |v: u32| &rows[v as usize];
         filter(
             strangers,
-            |pair, lane, group| {
-                for (side, &t) in pair.iter().enumerate() {
-                    for (k, &v) in mesh.triangles[t as usize].iter().enumerate() {
-                        put(group, 3 * side + k, lane, &x[v as usize]);
-                    }
-                }
+            |pair| {
+                let [[a, b, c], [p, q, r]] = pair.map(|t| mesh.triangles[t as usize].map(row));
+                [a, b, c, p, q, r]
             },
-            |group| four_triangles_apart(group, 0.0),
-            |&[s, t]| {
-                if triangles_meet(mesh.triangles[s as usize], mesh.triangles[t as usize], x) {
-                    found.push([s.min(t), s.max(t)]);
+            |rows| four_triangles_apart(rows, 0.0),
+            |pair| {
+                let [first, second] = pair.map(|t| mesh.triangles[t as usize].map(|v| x[v as usize]));
+                if triangles_meet(&first, &second) {
+                    found.push(pair);
                 }
             },
         );
         filter(
             sides,
-            |item, lane, group| {
-                for (k, &v) in item.side.iter().chain(&item.triangle).enumerate() {
-                    put(group, k, lane, &x[v as usize]);
-                }
-            },
-            |group| four_segment_triangles_apart(group, 0.0),
             |item| {
-                if side_meets(item.side, item.triangle, x) {
+                let ([p, q], [a, b, c]) = (item.ends.map(row), item.triangle.map(row));
+                [p, q, a, b, c]
+            },
+            |rows| four_segment_triangles_apart(rows, 0.0),
+            |item| {
+                if segment_meets_triangle(
+                    &item.ends.map(|v| x[v as usize]),
+                    &item.triangle.map(|v| x[v as usize]),
+                ) {
                     found.push(item.pair);
                 }
             },
@@ -122,8 +127,8 @@ impl Visit for Meetings<'_> {
                 0 => self.strangers.push(pair),
                 1 => {
                     let opposite = |tri: [u32; 3], k: usize| [tri[(k + 1) % 3], tri[(k + 2) % 3]];
-                    self.sides.push(Side { pair, side: opposite(first, corners.0), triangle: second });
-                    self.sides.push(Side { pair, side: opposite(second, corners.1), triangle: first });
+                    self.sides.push(Side { pair, ends: opposite(first, corners.0), triangle: second });
+                    self.sides.push(Side { pair, ends: opposite(second, corners.1), triangle: first });
                 }
                 _ => {}
             }

@@ -1,23 +1,34 @@
 //! The narrow phase of a traversal: candidates in, contacts out.
 
 use super::traverse::{Candidates, Sink};
-use crate::ccd::filter::{Group, filter, four_edge_edges_apart, four_vertex_triangles_apart, put};
+use crate::ccd::filter::{
+    Row, filter, four_edge_edges_apart, four_edge_edges_maybe_apart, four_vertex_triangles_apart,
+    four_vertex_triangles_maybe_apart, row,
+};
 use crate::ccd::{edge_edge_march, vertex_triangle_march};
 use crate::{CollisionMesh, Contacts, Mode, Query, Vec3};
 use cloth_mesh::NONE;
+
+/// Both ends of a vertex's motion, in one cache line.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Motion([Row; 2]);
 
 /// What the narrow phase knows of a query.
 pub(super) struct Scene<'a> {
     mesh: &'a CollisionMesh,
     query: &'a Query<'a>,
-    /// Both ends of each vertex's motion side by side.
-    motion: Vec<[Vec3; 2]>,
+    motion: Vec<Motion>,
 }
 
 impl<'a> Scene<'a> {
     pub(super) fn new(mesh: &'a CollisionMesh, query: &'a Query<'a>) -> Self {
         let start = if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 };
-        Self { mesh, query, motion: start.iter().zip(query.x_t1).map(|(&a, &b)| [a, b]).collect() }
+        Self {
+            mesh,
+            query,
+            motion: start.iter().zip(query.x_t1).map(|(a, b)| Motion([row(a), row(b)])).collect(),
+        }
     }
 
     fn is_wanted(&self, first: &[u32], second: &[u32]) -> bool {
@@ -27,18 +38,14 @@ impl<'a> Scene<'a> {
             && self.query.active.is_none_or(|mask| first.iter().chain(second).any(|&v| mask[v as usize]))
     }
 
-    fn points(&self, vertices: [u32; 4]) -> [Vec3; 8] {
-        let p = vertices.map(|v| self.motion[v as usize]);
-        [p[0][0], p[1][0], p[2][0], p[3][0], p[0][1], p[1][1], p[2][1], p[3][1]]
+    #[inline]
+    fn rows(&self, vertices: [u32; 4]) -> [&Row; 8] {
+        let [a, b, c, d] = vertices.map(|v| &self.motion[v as usize].0);
+        [&a[0], &b[0], &c[0], &d[0], &a[1], &b[1], &c[1], &d[1]]
     }
 
-    /// Writes the four vertices of a pair into its lane.
-    fn gather(&self, vertices: [u32; 4], lane: usize, group: &mut Group<8>) {
-        for (k, v) in vertices.into_iter().enumerate() {
-            let [x0, x1] = &self.motion[v as usize];
-            put(group, k, lane, x0);
-            put(group, k + 4, lane, x1);
-        }
+    fn points(&self, vertices: [u32; 4]) -> [Vec3; 8] {
+        self.rows(vertices).map(|row| Vec3::new(row[0], row[1], row[2]))
     }
 }
 
@@ -48,6 +55,7 @@ type Pair = ([u32; 2], [u32; 4]);
 pub(super) struct Narrow<'a> {
     scene: &'a Scene<'a>,
     waiting: Vec<Pair>,
+    left: Vec<Pair>,
     vertex_triangle: Vec<([u32; 2], f64)>,
     edge_edge: Vec<([u32; 2], f64)>,
     candidates_vertex_triangle: u64,
@@ -60,6 +68,7 @@ impl<'a> Narrow<'a> {
         Self {
             scene,
             waiting: vec![],
+            left: vec![],
             vertex_triangle: vec![],
             edge_edge: vec![],
             candidates_vertex_triangle: 0,
@@ -71,9 +80,9 @@ impl<'a> Narrow<'a> {
 
 impl Sink for Narrow<'_> {
     fn take(&mut self, candidates: &mut Candidates) {
-        let Self { scene, waiting, .. } = self;
+        let Self { scene, waiting, left, .. } = self;
         let (mesh, thickness) = (scene.mesh, scene.query.thickness);
-        let gather = |pair: &Pair, lane: usize, group: &mut Group<8>| scene.gather(pair.1, lane, group);
+        let rows = |pair: &Pair| scene.rows(pair.1);
         let time = |t: f64| if scene.query.mode == Mode::Continuous { t } else { 1.0 };
 
         waiting.clear();
@@ -86,11 +95,13 @@ impl Sink for Narrow<'_> {
             }
         }
         self.candidates_vertex_triangle += waiting.len() as u64;
+        left.clear();
+        filter(waiting, rows, |r| four_vertex_triangles_maybe_apart(r, thickness), |pair| left.push(pair));
         filter(
-            waiting,
-            gather,
-            |g| four_vertex_triangles_apart(g, thickness),
-            |&(pair, vertices)| {
+            left,
+            rows,
+            |r| four_vertex_triangles_apart(r, thickness),
+            |(pair, vertices)| {
                 self.root_searches += 1;
                 if let Some(t) = vertex_triangle_march(&scene.points(vertices), thickness) {
                     self.vertex_triangle.push((pair, time(t)));
@@ -109,11 +120,13 @@ impl Sink for Narrow<'_> {
             }
         }
         self.candidates_edge_edge += waiting.len() as u64;
+        left.clear();
+        filter(waiting, rows, |r| four_edge_edges_maybe_apart(r, thickness), |pair| left.push(pair));
         filter(
-            waiting,
-            gather,
-            |g| four_edge_edges_apart(g, thickness),
-            |&(pair, vertices)| {
+            left,
+            rows,
+            |r| four_edge_edges_apart(r, thickness),
+            |(pair, vertices)| {
                 self.root_searches += 1;
                 if let Some(t) = edge_edge_march(&scene.points(vertices), thickness) {
                     self.edge_edge.push((pair, time(t)));

@@ -2,6 +2,7 @@
 
 use super::Bvh;
 use super::traverse::{Candidates, Sink, Streaming};
+use crate::ccd::filter::{Row, filter, four_edge_edges_beyond, four_vertex_triangles_beyond, row};
 use crate::distance::{edge_edge, vertex_triangle};
 use crate::{CollisionMesh, DetectError, Mode, Query, Stencil, StencilKind, Vec3};
 use cloth_mesh::NONE;
@@ -13,7 +14,7 @@ impl Bvh {
     /// edges (elsewhere an end vertex is the closest, and its vertex-triangle stencil stands for the pair); of the
     /// vertex-triangle stencils of one vertex whose closest point is the same inner point of an edge, or the same
     /// vertex, the one of the lowest triangle; of two stencils of the same two vertices the one that starts with
-    /// the lower vertex. A pair is within the thickness if its computed distance is. Sorted by kind, then vertices
+    /// the lower vertex. Distances are compared as computed, to a few units of rounding. Sorted by kind, then vertices
     /// of the vertex-triangle stencils (vertex, triangle index) and edge indices of the edge-edge stencils.
     ///
     /// Normals point from the second point to the first; where the distance vanishes, along the plane's normal
@@ -33,7 +34,15 @@ impl Bvh {
         query.check(mesh)?;
         self.check_mesh(mesh)?;
         self.refit(mesh, &query, pool);
-        let sink = || Near { mesh, query: &query, vertex_triangle: vec![], edge_edge: vec![] };
+        let rows: Vec<Row> = x.iter().map(row).collect();
+        let sink = || Near {
+            mesh,
+            query: &query,
+            rows: &rows,
+            waiting: vec![],
+            vertex_triangle: vec![],
+            edge_edge: vec![],
+        };
         let (visits, _) = self.traverse(mesh, pool, || Streaming::new(sink()));
 
         let (mut vertex_triangle, mut edge_edge) = (vec![], vec![]);
@@ -41,18 +50,28 @@ impl Bvh {
             vertex_triangle.extend(sink.vertex_triangle);
             edge_edge.extend(sink.edge_edge);
         }
-        // Equal closest features side by side, the one to keep first.
-        vertex_triangle.sort_unstable_by_key(|n: &NearVertex| (n.features, n.vertex, n.triangle));
-        vertex_triangle.dedup_by_key(|n| n.features);
-        vertex_triangle.sort_unstable_by_key(|n| (n.vertex, n.triangle));
-        edge_edge.sort_unstable_by_key(|n: &([u32; 2], Stencil)| n.0);
-        Ok(vertex_triangle.into_iter().map(|n| n.stencil).chain(edge_edge.into_iter().map(|n| n.1)).collect())
+        // Equal closest features side by side, the one to keep first. Keys are sorted, not the stencils.
+        let mut keys: Vec<([u32; 4], [u32; 2], u32)> = vertex_triangle
+            .iter()
+            .enumerate()
+            .map(|(k, n): (_, &NearVertex)| (n.features, n.pair, k as u32))
+            .collect();
+        keys.sort_unstable();
+        keys.dedup_by_key(|k| k.0);
+        let mut kept: Vec<([u32; 2], u32)> = keys.into_iter().map(|k| (k.1, k.2)).collect();
+        kept.sort_unstable();
+        let mut edges: Vec<([u32; 2], u32)> =
+            edge_edge.iter().enumerate().map(|(k, n): (_, &([u32; 2], Stencil))| (n.0, k as u32)).collect();
+        edges.sort_unstable();
+        let vertex_triangle = kept.into_iter().map(|k| vertex_triangle[k.1 as usize].stencil);
+        let edge_edge = edges.into_iter().map(|k| edge_edge[k.1 as usize].1);
+        Ok(vertex_triangle.chain(edge_edge).collect())
     }
 }
 
 struct NearVertex {
-    vertex: u32,
-    triangle: u32,
+    /// Vertex and triangle.
+    pair: [u32; 2],
     /// The vertices that span the two closest features: for two vertices both, sorted; else the vertex, then those
     /// of the triangle's closest feature, sorted, and [`NONE`].
     features: [u32; 4],
@@ -62,56 +81,81 @@ struct NearVertex {
 struct Near<'a> {
     mesh: &'a CollisionMesh,
     query: &'a Query<'a>,
+    rows: &'a [Row],
+    waiting: Vec<Pair>,
     vertex_triangle: Vec<NearVertex>,
     edge_edge: Vec<([u32; 2], Stencil)>,
 }
 
+type Pair = ([u32; 2], [u32; 4]);
+
 impl Near<'_> {
-    fn is_active(&self, vertices: [u32; 4]) -> bool {
-        self.query.active.is_none_or(|mask| vertices.iter().any(|&v| mask[v as usize]))
+    fn is_wanted(&self, first: &[u32], second: &[u32]) -> bool {
+        // The traversal has seen to the bodies.
+        !first.iter().any(|v| second.contains(v))
+            && !self.mesh.is_attached(first, second)
+            && self.query.active.is_none_or(|mask| first.iter().chain(second).any(|&v| mask[v as usize]))
     }
 }
 
 impl Sink for Near<'_> {
     fn take(&mut self, candidates: &mut Candidates) {
-        let x = self.query.x_t1;
+        let (mesh, x, thickness) = (self.mesh, self.query.x_t1, self.query.thickness);
+        let mut waiting = std::mem::take(&mut self.waiting);
+        let rows = |pair: &Pair| pair.1.map(|v| &self.rows[v as usize]);
+
+        waiting.clear();
         for [v, t] in candidates.vertex_triangle.drain(..) {
-            if v == NONE || t == NONE || !self.mesh.vertex_triangle_admissible(v, t) {
-                continue;
+            if v != NONE && t != NONE {
+                let [a, b, c] = mesh.triangles[t as usize];
+                if self.is_wanted(&[v], &[a, b, c]) {
+                    waiting.push(([v, t], [v, a, b, c]));
+                }
             }
-            let [a, b, c] = self.mesh.triangles[t as usize];
-            let vertices = [v, a, b, c];
-            let p = vertices.map(|k| x[k as usize]);
-            let w = vertex_triangle::closest_point(&p);
-            let r = (p[0] - p[1]) * w[0] + (p[0] - p[2]) * w[1] + (p[0] - p[3]) * w[2];
-            if r.norm() > self.query.thickness || !self.is_active(vertices) {
-                continue;
-            }
-            let weights = [1.0, -w[0], -w[1], -w[2]];
-            let stencil = Stencil::new(StencilKind::VertexTriangle, vertices, weights, &p);
-            self.vertex_triangle.push(NearVertex {
-                vertex: v,
-                triangle: t,
-                features: features(vertices, &w),
-                stencil,
-            });
         }
+        filter(
+            &waiting,
+            rows,
+            |r| four_vertex_triangles_beyond(r, thickness),
+            |(pair, vertices)| {
+                let p = vertices.map(|k| x[k as usize]);
+                let w = vertex_triangle::closest_point(&p);
+                let stencil =
+                    Stencil::new(StencilKind::VertexTriangle, vertices, [1.0, -w[0], -w[1], -w[2]], &p);
+                if stencil.distance <= thickness {
+                    let features = features(vertices, &w);
+                    self.vertex_triangle.push(NearVertex { pair, features, stencil });
+                }
+            },
+        );
+
+        waiting.clear();
         for [e, f] in candidates.edge_edge.drain(..) {
-            if e == NONE || f == NONE || !self.mesh.edge_edge_admissible(e, f) {
-                continue;
+            if e != NONE && f != NONE {
+                let pair = [e.min(f), e.max(f)];
+                let (a, b) = (mesh.edges[pair[0] as usize], mesh.edges[pair[1] as usize]);
+                if self.is_wanted(&a, &b) {
+                    waiting.push((pair, [a[0], a[1], b[0], b[1]]));
+                }
             }
-            let pair = [e.min(f), e.max(f)];
-            let ([a0, a1], [b0, b1]) = (self.mesh.edges[pair[0] as usize], self.mesh.edges[pair[1] as usize]);
-            let vertices = [a0, a1, b0, b1];
-            let p = vertices.map(|k| x[k as usize]);
-            let Some((s, t)) = edge_edge::closest_inner_points(&p) else { continue };
-            let r = (p[0] - p[2]) + (p[1] - p[0]) * s - (p[3] - p[2]) * t;
-            if r.norm() > self.query.thickness || !self.is_active(vertices) {
-                continue;
-            }
-            let weights = [1.0 - s, s, t - 1.0, -t];
-            self.edge_edge.push((pair, Stencil::new(StencilKind::EdgeEdge, vertices, weights, &p)));
         }
+        filter(
+            &waiting,
+            rows,
+            |r| four_edge_edges_beyond(r, thickness),
+            |(pair, vertices)| {
+                let p = vertices.map(|k| x[k as usize]);
+                let (s, t) = edge_edge::closest_points(&p);
+                if s > 0.0 && s < 1.0 && t > 0.0 && t < 1.0 {
+                    let stencil =
+                        Stencil::new(StencilKind::EdgeEdge, vertices, [1.0 - s, s, t - 1.0, -t], &p);
+                    if stencil.distance <= thickness {
+                        self.edge_edge.push((pair, stencil));
+                    }
+                }
+            },
+        );
+        self.waiting = waiting;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::Bvh;
 use crate::CollisionMesh;
+use crate::bounds::LANES;
 use cloth_mesh::NONE;
 
 impl Bvh {
@@ -12,20 +13,20 @@ impl Bvh {
     /// The first violation, in words.
     pub fn validate(&self, mesh: &CollisionMesh) -> Result<(), String> {
         let tree = &self.tree;
-        let count = |blocks: &[[u32; crate::bounds::LANES]], n: usize, what: &str| {
+        let count = |blocks: &[[u32; LANES]], n: usize| {
             let mut seen = vec![0u32; n];
             blocks.iter().flatten().filter(|&&id| id != NONE).for_each(|&id| seen[id as usize] += 1);
-            Ok::<_, String>((seen, what.to_owned()))
+            seen
         };
-        let (seen, _) = count(&tree.triangle_ids, mesh.triangles.len(), "triangle")?;
+        let seen = count(&tree.triangle_ids, mesh.triangles.len());
         if let Some(t) = seen.iter().position(|&n| n != 1) {
             return Err(format!("triangle {t} is in {} leaves", seen[t]));
         }
-        let (seen, _) = count(&tree.edge_ids, mesh.edges.len(), "edge")?;
+        let seen = count(&tree.edge_ids, mesh.edges.len());
         if let Some(e) = seen.iter().position(|&n| n != 1) {
             return Err(format!("edge {e} is in {} leaves", seen[e]));
         }
-        let (seen, _) = count(&tree.vertex_ids, mesh.vertex_count, "vertex")?;
+        let seen = count(&tree.vertex_ids, mesh.vertex_count);
         if let Some(v) = (0..seen.len()).find(|&v| seen[v] != u32::from(mesh.vertex_owner[v] != NONE)) {
             return Err(format!("vertex {v} is in {} leaves", seen[v]));
         }
@@ -64,5 +65,48 @@ impl Bvh {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Bvh, CollisionMesh, Vec3};
+
+    fn strip(n: u32) -> (CollisionMesh, Vec<Vec3>) {
+        let triangles: Vec<[u32; 3]> = (0..n).map(|k| [k, k + 1, k + 2]).collect();
+        let x: Vec<Vec3> =
+            (0..n + 2).map(|k| Vec3::new(f64::from(k), f64::from(k % 2), f64::from(k * k % 7))).collect();
+        (CollisionMesh::single(x.len(), &triangles).unwrap(), x)
+    }
+
+    #[test]
+    fn trees_of_all_small_sizes_are_valid_before_and_after_a_refit() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        for n in 0..100 {
+            let (mesh, x) = strip(n);
+            let mut bvh = Bvh::new(&mesh, &x).unwrap();
+            bvh.validate(&mesh).unwrap();
+            bvh.intersections(&mesh, &x, &pool).unwrap();
+            bvh.validate(&mesh).unwrap();
+        }
+    }
+
+    #[test]
+    fn planted_faults_are_found() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let (mesh, x) = strip(50);
+        let mut good = Bvh::new(&mesh, &x).unwrap();
+        good.intersections(&mesh, &x, &pool).unwrap();
+        let fault = |plant: &dyn Fn(&mut Bvh)| {
+            let mut bad = good.clone();
+            plant(&mut bad);
+            bad.validate(&mesh).expect_err("a fault was planted")
+        };
+        assert!(fault(&|b| b.tree.triangle_ids[0][0] = b.tree.triangle_ids[1][0]).contains("triangle"));
+        assert!(fault(&|b| b.tree.edge_ids[0][0] = cloth_mesh::NONE).contains("edge"));
+        assert!(fault(&|b| b.tree.vertex_ids[0][0] = cloth_mesh::NONE).contains("vertex"));
+        assert!(fault(&|b| b.tree.nodes[0].right += 1).contains("node"));
+        assert!(fault(&|b| b.boxes.nodes[1].hi[1][0] += 1e6).contains("box"));
+        assert!(fault(&|b| b.boxes.vertices[7].lo[0][2] -= 1e6).contains("vertex 7"));
     }
 }

@@ -61,19 +61,23 @@ impl Motion<4> for EdgeEdgeMotion {
         inside.contains(&s) && inside.contains(&q)
     }
 
-    fn directions(&self, t: f64, mut visit: impl FnMut(Vec3)) {
+    #[inline]
+    fn directions(&self, t: f64, mut visit: impl FnMut(Vec3) -> bool) {
         let (u, v) = self.edges_at(t);
         let d = self.relative.at(t);
         // Edge a as 0, u and edge b as −d00, v − d00.
         let (s, q) = closest_points(&[Vec3::zeros(), u, -d[0], v - d[0]]);
         let mix = |x: Vec3, y: Vec3, w: f64| x * (1.0 - w) + y * w;
-        visit(mix(mix(d[0], d[1], q), mix(d[2], d[3], q), s));
-        let n = u.cross(&v);
-        visit(if n.dot(&d[0]) > 0.0 { n } else { -n });
-        // In the common plane, across each edge, to both sides.
-        for across in [n.cross(&u), n.cross(&v)] {
-            visit(across);
-            visit(-across);
+        if visit(mix(mix(d[0], d[1], q), mix(d[2], d[3], q), s)) {
+            return;
         }
+        let n = u.cross(&v);
+        let (across_u, across_v) = (n.cross(&u), n.cross(&v));
+        // Across both edges; in their common plane, across each edge, to both sides.
+        let _ = visit(if n.dot(&d[0]) > 0.0 { n } else { -n })
+            || visit(across_u)
+            || visit(-across_u)
+            || visit(across_v)
+            || visit(-across_v);
     }
 }

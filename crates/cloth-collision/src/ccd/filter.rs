@@ -10,8 +10,13 @@ use super::ROUNDING;
 use super::lanes::{Lanes, Vector};
 use crate::Vec3;
 
-/// Iterations of Gilbert's algorithm, by measurement: more cost more than the exact searches they save.
-const DIRECTIONS: usize = 5;
+/// Directions of Gilbert's algorithm that are tried with every candidate, by measurement.
+const FEW: usize = 2;
+/// Directions that are tried with what is left then: more cost more than the exact searches that they save.
+const MANY: usize = 8;
+
+/// Directions for pairs at rest.
+const AT_REST: usize = 5;
 
 /// Eight points (four at t0, the same four at t1) of as many pairs as there are lanes.
 pub(crate) type Points<L> = [Vector<L>; 8];
@@ -48,8 +53,19 @@ pub(crate) fn determinant<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Ve
 /// Where the vertex certainly stays farther than `thickness` from the triangle during the step.
 #[inline(always)]
 pub(crate) fn vertex_triangle_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
+    vertex_triangle::<L, MANY>(p, thickness)
+}
+
+/// [`vertex_triangle_apart`] with less effort.
+#[inline(always)]
+fn vertex_triangle_maybe_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
+    vertex_triangle::<L, FEW>(p, thickness)
+}
+
+#[inline(always)]
+fn vertex_triangle<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
     let d = [p[1] - p[0], p[2] - p[0], p[3] - p[0], p[5] - p[4], p[6] - p[4], p[7] - p[4]];
-    let apart = separated(&d, thickness);
+    let apart = separated::<L, 6, STEPS>(&d, thickness);
     if thickness > 0.0 {
         return apart;
     }
@@ -59,6 +75,17 @@ pub(crate) fn vertex_triangle_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> 
 /// Where the edges certainly stay farther than `thickness` apart during the step.
 #[inline(always)]
 pub(crate) fn edge_edge_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
+    edge_edge::<L, MANY>(p, thickness)
+}
+
+/// [`edge_edge_apart`] with less effort.
+#[inline(always)]
+fn edge_edge_maybe_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
+    edge_edge::<L, FEW>(p, thickness)
+}
+
+#[inline(always)]
+fn edge_edge<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
     let d = [
         p[0] - p[2],
         p[0] - p[3],
@@ -69,7 +96,7 @@ pub(crate) fn edge_edge_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mas
         p[5] - p[6],
         p[5] - p[7],
     ];
-    let apart = separated(&d, thickness);
+    let apart = separated::<L, 8, STEPS>(&d, thickness);
     if thickness > 0.0 {
         return apart;
     }
@@ -90,7 +117,7 @@ fn rootless<L: Lanes>((b, error): ([L; 4], L)) -> L::Mask {
 /// With g = n·d and u = 2⁻⁵³: differences carry u per coordinate, the dot product 3u, |n| 4u and its product with the
 /// thickness u: in all less than [`ROUNDING`] (|n|₁ max|d| + thickness |n|).
 #[inline(always)]
-fn separated<L: Lanes, const N: usize>(d: &[Vector<L>; N], thickness: f64) -> L::Mask {
+fn separated<L: Lanes, const N: usize, const STEPS: usize>(d: &[Vector<L>; N], thickness: f64) -> L::Mask {
     let mut extent = d[0].largest();
     let mut sum = d[0];
     for k in 1..N {
@@ -100,7 +127,7 @@ fn separated<L: Lanes, const N: usize>(d: &[Vector<L>; N], thickness: f64) -> L:
     let mut n = sum.scale(L::splat(1.0 / N as f64));
     let zero = L::splat(0.0);
     let mut apart = zero.greater(zero);
-    for step in 0..DIRECTIONS {
+    for step in 0..STEPS {
         let (mut lowest, mut corner) = (n.dot(d[0]), d[0]);
         for k in 1..N {
             let g = n.dot(d[k]);
@@ -116,7 +143,7 @@ fn separated<L: Lanes, const N: usize>(d: &[Vector<L>; N], thickness: f64) -> L:
             needed = needed + offset;
         }
         apart = apart | lowest.greater(needed + size * L::splat(ROUNDING));
-        if step + 1 < DIRECTIONS {
+        if step + 1 < STEPS {
             // Nearest point to the origin on the segment from n to the corner.
             let back = n - corner;
             let along = (n.dot(back) / back.dot(back)).max(zero).min(L::splat(1.0));
@@ -126,11 +153,23 @@ fn separated<L: Lanes, const N: usize>(d: &[Vector<L>; N], thickness: f64) -> L:
     apart
 }
 
+/// Where a vertex (first point) is certainly farther than `thickness` from a triangle (last three), all at rest.
+#[inline(always)]
+fn vertex_triangle_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
+    separated::<L, 3, AT_REST>(&[p[0] - p[1], p[0] - p[2], p[0] - p[3]], thickness)
+}
+
+/// Where an edge (first two points) is certainly farther than `thickness` from another (last two), all at rest.
+#[inline(always)]
+fn edge_edge_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
+    separated::<L, 4, AT_REST>(&[p[0] - p[2], p[0] - p[3], p[1] - p[2], p[1] - p[3]], thickness)
+}
+
 /// Where a segment (first two points) certainly has no point in common with a triangle (last three).
 #[inline(always)]
 fn segment_triangle_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
     let d = [p[0] - p[2], p[0] - p[3], p[0] - p[4], p[1] - p[2], p[1] - p[3], p[1] - p[4]];
-    separated(&d, 0.0)
+    separated::<L, 6, AT_REST>(&d, 0.0)
 }
 
 /// Where two triangles (three points each) certainly have no point in common.
@@ -147,25 +186,30 @@ fn triangle_triangle_apart<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
         p[2] - p[4],
         p[2] - p[5],
     ];
-    separated(&d, 0.0)
+    separated::<L, 9, AT_REST>(&d, 0.0)
 }
 
-/// Points of four pairs: `group[point][axis][lane]`.
-pub(crate) type Group<const N: usize> = [[[f64; 4]; 3]; N];
+/// A point with a fourth entry of no meaning, so that it fills a register.
+pub(crate) type Row = [f64; 4];
+
+/// Copies positions into rows.
+pub(crate) fn row(x: &Vec3) -> Row {
+    [x.x, x.y, x.z, 0.0]
+}
 
 macro_rules! four_at_once {
     ($name:ident, $avx:ident, $one:ident, $points:literal) => {
-        /// Bit per lane: the pair is certainly apart.
+        /// Bit per pair (`rows[pair][point]`): it is certainly apart.
         #[inline]
-        pub(crate) fn $name(group: &Group<$points>, thickness: f64) -> u32 {
+        pub(crate) fn $name(rows: &[[&Row; $points]; 4], thickness: f64) -> u32 {
             #[cfg(target_arch = "x86_64")]
             if std::arch::is_x86_feature_detected!("avx2") {
                 // SAFETY: the processor has AVX2.
-                return unsafe { $avx(group, thickness) };
+                return unsafe { $avx(rows, thickness) };
             }
             let mut bits = 0;
-            for lane in 0..4 {
-                let points = group.map(|point| Vector(point.map(|lanes| lanes[lane])));
+            for (lane, points) in rows.iter().enumerate() {
+                let points = points.map(|row| Vector([row[0], row[1], row[2]]));
                 bits |= u32::from($one(&points, thickness)) << lane;
             }
             bits
@@ -173,50 +217,59 @@ macro_rules! four_at_once {
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
-        fn $avx(group: &Group<$points>, thickness: f64) -> u32 {
+        fn $avx(rows: &[[&Row; $points]; 4], thickness: f64) -> u32 {
             use super::lanes::avx::Four;
             let mut points = [Vector([Four::splat(0.0); 3]); $points];
-            for (point, [x, y, z]) in points.iter_mut().zip(group) {
+            for k in 0..$points {
                 // SAFETY: this function runs only where the processor has AVX2.
-                *point = unsafe { Vector([Four::load(x), Four::load(y), Four::load(z)]) };
+                points[k] = Vector(unsafe {
+                    Four::load_transposed([rows[0][k], rows[1][k], rows[2][k], rows[3][k]])
+                });
             }
             $one(&points, thickness).bits()
         }
     };
 }
+four_at_once!(
+    four_vertex_triangles_maybe_apart,
+    four_vertex_triangles_maybe_apart_avx2,
+    vertex_triangle_maybe_apart,
+    8
+);
+four_at_once!(four_edge_edges_maybe_apart, four_edge_edges_maybe_apart_avx2, edge_edge_maybe_apart, 8);
 four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, vertex_triangle_apart, 8);
 four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart, 8);
+four_at_once!(four_vertex_triangles_beyond, four_vertex_triangles_beyond_avx2, vertex_triangle_beyond, 4);
+four_at_once!(four_edge_edges_beyond, four_edge_edges_beyond_avx2, edge_edge_beyond, 4);
 four_at_once!(four_segment_triangles_apart, four_segment_triangles_apart_avx2, segment_triangle_apart, 5);
 four_at_once!(four_triangles_apart, four_triangles_apart_avx2, triangle_triangle_apart, 6);
 
-/// Calls `survivor` with each item that the filter does not reject: `points` writes an item into its lane of a group,
-/// `apart` answers for a group.
+/// Calls `survivor` with each item that the filter does not reject: `points` names an item's rows, `apart` answers for
+/// four items.
 #[inline]
-pub(crate) fn filter<T, const N: usize>(
+pub(crate) fn filter<'a, T: Copy, const N: usize>(
     items: &[T],
-    points: impl Fn(&T, usize, &mut Group<N>),
-    apart: impl Fn(&Group<N>) -> u32,
-    mut survivor: impl FnMut(&T),
+    points: impl Fn(&T) -> [&'a Row; N],
+    apart: impl Fn(&[[&'a Row; N]; 4]) -> u32,
+    mut survivor: impl FnMut(T),
 ) {
-    let mut group = [[[0.0; 4]; 3]; N];
-    for four in items.chunks(4) {
-        for (lane, item) in four.iter().enumerate() {
-            points(item, lane, &mut group);
-        }
-        let apart = apart(&group);
-        for (lane, item) in four.iter().enumerate() {
+    let mut fours = items.chunks_exact(4);
+    for four in &mut fours {
+        let apart = apart(&[points(&four[0]), points(&four[1]), points(&four[2]), points(&four[3])]);
+        for lane in 0..4 {
             if apart >> lane & 1 == 0 {
-                survivor(item);
+                survivor(four[lane]);
             }
         }
     }
-}
-
-/// Writes a point into a lane.
-#[inline]
-pub(crate) fn put<const N: usize>(group: &mut Group<N>, index: usize, lane: usize, point: &Vec3) {
-    for axis in 0..3 {
-        group[index][axis][lane] = point[axis];
+    let rest = fours.remainder();
+    let Some(last) = rest.last() else { return };
+    let item = |lane: usize| points(rest.get(lane).unwrap_or(last));
+    let apart = apart(&[item(0), item(1), item(2), item(3)]);
+    for (lane, &item) in rest.iter().enumerate() {
+        if apart >> lane & 1 == 0 {
+            survivor(item);
+        }
     }
 }
 

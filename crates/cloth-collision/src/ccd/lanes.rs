@@ -129,12 +129,28 @@ pub(crate) mod avx {
     pub(crate) struct FourMask(arch::__m256d);
 
     impl Four {
+        /// The first three entries of four rows, by entry.
+        ///
         /// # Safety
         /// The processor has AVX2.
         #[inline(always)]
-        pub(crate) unsafe fn load(lanes: &[f64; 4]) -> Self {
-            // SAFETY: 32 readable bytes; AVX2 by the caller's promise.
-            Self(unsafe { arch::_mm256_loadu_pd(lanes.as_ptr()) })
+        pub(crate) unsafe fn load_transposed(rows: [&[f64; 4]; 4]) -> [Self; 3] {
+            // SAFETY: 32 readable bytes in each row; AVX2 by the caller's promise.
+            unsafe {
+                let [a, b, c, d] = [
+                    arch::_mm256_loadu_pd(rows[0].as_ptr()),
+                    arch::_mm256_loadu_pd(rows[1].as_ptr()),
+                    arch::_mm256_loadu_pd(rows[2].as_ptr()),
+                    arch::_mm256_loadu_pd(rows[3].as_ptr()),
+                ];
+                let (ab_xz, ab_y) = (arch::_mm256_unpacklo_pd(a, b), arch::_mm256_unpackhi_pd(a, b));
+                let (cd_xz, cd_y) = (arch::_mm256_unpacklo_pd(c, d), arch::_mm256_unpackhi_pd(c, d));
+                [
+                    Self(arch::_mm256_permute2f128_pd::<0x20>(ab_xz, cd_xz)),
+                    Self(arch::_mm256_permute2f128_pd::<0x20>(ab_y, cd_y)),
+                    Self(arch::_mm256_permute2f128_pd::<0x31>(ab_xz, cd_xz)),
+                ]
+            }
         }
     }
 

@@ -48,8 +48,8 @@ trait Motion<const K: usize> {
     fn cubic(&self) -> Cubic;
     /// Whether the features all but touch at t, well inside both. No certificate.
     fn is_inside(&self, t: f64) -> bool;
-    /// Directions along which the features may be apart at t. No certificate.
-    fn directions(&self, t: f64, visit: impl FnMut(Vec3));
+    /// Directions along which the features may be apart at t, until `visit` is content. No certificate.
+    fn directions(&self, t: f64, visit: impl FnMut(Vec3) -> bool);
 }
 
 /// Time of the first contact of a vertex with a triangle.
@@ -124,7 +124,10 @@ fn march<const K: usize>(mut motion: impl Motion<K>) -> Option<f64> {
             }
         }
         let mut until = t;
-        motion.directions(t, |n| until = until.max(relative.separated_until(&n, t)));
+        motion.directions(t, |n| {
+            until = until.max(relative.separated_until(&n, t));
+            until > 1.0
+        });
         if until > 1.0 {
             return None;
         }

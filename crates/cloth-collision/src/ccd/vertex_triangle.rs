@@ -46,15 +46,18 @@ impl Motion<3> for VertexTriangleMotion {
         w.iter().all(|&w| w > margin)
     }
 
-    fn directions(&self, t: f64, mut visit: impl FnMut(Vec3)) {
+    #[inline]
+    fn directions(&self, t: f64, mut visit: impl FnMut(Vec3) -> bool) {
         let [a, b, c] = self.0.at(t);
         let w = closest_point(&[Vec3::zeros(), a, b, c]);
-        visit(a * w[0] + b * w[1] + c * w[2]);
-        let n = (b - a).cross(&(c - a));
-        visit(if n.dot(&a) > 0.0 { n } else { -n });
-        // In the plane, from each side inwards.
-        for (p, q) in [(a, b), (b, c), (c, a)] {
-            visit(n.cross(&(q - p)));
+        if visit(a * w[0] + b * w[1] + c * w[2]) {
+            return;
         }
+        let n = (b - a).cross(&(c - a));
+        // Across the plane; in the plane, from each side inwards.
+        let _ = visit(if n.dot(&a) > 0.0 { n } else { -n })
+            || visit(n.cross(&(b - a)))
+            || visit(n.cross(&(c - b)))
+            || visit(n.cross(&(a - c)));
     }
 }

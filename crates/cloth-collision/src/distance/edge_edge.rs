@@ -31,7 +31,7 @@ pub fn closest_points(p: &[Vec3; 4]) -> (f64, f64) {
 /// are parallel.
 ///
 /// r + s u − t v is parallel to n = u×v: s = (v×r)·n / n², t = (u×r)·n / n².
-pub fn closest_inner_points(p: &[Vec3; 4]) -> Option<(f64, f64)> {
+fn closest_inner_points(p: &[Vec3; 4]) -> Option<(f64, f64)> {
     let (u, v, r) = (p[1] - p[0], p[3] - p[2], p[0] - p[2]);
     let n = u.cross(&v);
     let n2 = n.norm_squared();

@@ -1,5 +1,6 @@
 //! Seeded random scenes and pools, shared by the tests.
 #![allow(dead_code, reason = "each test binary uses its part")]
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use cloth_collision::{Body, CollisionMesh, Vec3};
 
