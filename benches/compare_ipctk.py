@@ -1,0 +1,155 @@
+"""Detection beside IPC Toolkit on the published frame pairs, in one run.
+
+Usage: ``python benches/compare_ipctk.py [--repeats N] [--scenes NAME ...] [--json FILE]``. Needs ``clothsim``, ``numpy`` and
+``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA`` or ``../shared/data``.
+
+What is timed, per scene, medians over the repeats, rounds interleaved so that all see the same machine:
+
+* ours: ``clothsim.collision.detect`` as a user calls it (checks, topology, tree, detection, arrays), 1 and 2 threads: every colliding
+  pair with its time. ``self_intersections`` likewise: every pair.
+* IPC Toolkit, 1 thread: ``Candidates.build`` with ``LBVH``; then additive CCD over all candidates. Its Python face has no call for
+  that, so a seeded sample of candidates is timed one by one, the cost of such a call is measured with a candidate
+  that ends at once (``tmax`` = 0) and subtracted, and the rest is scaled to all of them.
+* IPC Toolkit, 2 threads: the same build, then ``compute_collision_free_stepsize`` with ``AdditiveCCD``: the earliest impact only.
+* IPC Toolkit ``has_intersections``, 1 and 2 threads: whether there is any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import ipctk
+import numpy as np
+
+import clothsim as cs
+
+SCENES = ("cloth-ball", "cloth-funnel", "n-body-simulation")
+SAMPLE = 50_000
+SEED = 1
+
+
+def data_folder() -> Path:
+    """Return the folder of the frame pairs."""
+    root = os.environ.get("CLOTHSIM_DATA")
+    folder = Path(root) if root else Path(__file__).resolve().parents[2] / "shared" / "data"
+    for candidate in (folder / "ccd", folder):
+        if (candidate / "cloth-ball.npz").exists():
+            return candidate
+    sys.exit(f"no cloth-ball.npz under {folder}; set CLOTHSIM_DATA")
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """Time one call."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def additive_over_all(mesh: ipctk.CollisionMesh, candidates: ipctk.Candidates, x0: np.ndarray, x1: np.ndarray) -> float:
+    """Estimate the seconds of additive CCD over all candidates from a sample."""
+    random = np.random.default_rng(SEED)
+    picked = [candidates[int(k)] for k in random.integers(len(candidates), size=min(SAMPLE, len(candidates)))]
+    edges, faces = mesh.edges, mesh.faces
+    frames = []
+    for stencil in picked:
+        ids = [v for v in stencil.vertex_ids(edges, faces) if v >= 0]
+        frames.append((x0[ids].ravel(), x1[ids].ravel()))
+    ccd = ipctk.AdditiveCCD()
+
+    def run(tmax: float) -> float:
+        start = time.perf_counter()
+        for stencil, (p, q) in zip(picked, frames, strict=True):
+            stencil.ccd(p, q, 0.0, tmax, ccd)
+        return time.perf_counter() - start
+
+    return (run(1.0) - run(0.0)) / len(picked) * len(candidates)
+
+
+def measure(scene: str, repeats: int) -> dict[str, list[float]]:
+    """Time everything on one scene."""
+    z = np.load(data_folder() / f"{scene}.npz")
+    x0, x1, triangles = z["V0"], z["V1"], z["F"]
+    mesh = ipctk.CollisionMesh(x0, ipctk.edges(triangles), triangles)
+    f0, f1 = np.asfortranarray(x0), np.asfortranarray(x1)
+    times: dict[str, list[float]] = {}
+
+    def note(name: str, value: float) -> None:
+        times.setdefault(name, []).append(value)
+
+    for _ in range(repeats):
+        for threads in (1, 2):
+            note(f"detect, {threads}", seconds(lambda t=threads: cs.collision.detect(x0, x1, triangles, threads=t)))
+            note(
+                f"self_intersections, {threads}",
+                seconds(lambda t=threads: cs.collision.self_intersections(x0, triangles, threads=t)),
+            )
+            ipctk.set_num_threads(threads)
+            note(f"ipctk has_intersections, {threads}", seconds(lambda: ipctk.has_intersections(mesh, f0)))
+            candidates = ipctk.Candidates()
+            build = seconds(lambda c=candidates: c.build(mesh, f0, f1, 0.0, ipctk.LBVH()))
+            note(f"ipctk LBVH, {threads}", build)
+            if threads == 1:
+                narrow = additive_over_all(mesh, candidates, x0, x1)
+                note("ipctk additive CCD, all, 1", narrow)
+                note("ipctk LBVH + additive CCD, all, 1", build + narrow)
+            else:
+                search = seconds(
+                    lambda c=candidates: c.compute_collision_free_stepsize(mesh, f0, f1, 0.0, ipctk.AdditiveCCD())
+                )
+                note("ipctk earliest impact, 2", search)
+                note("ipctk LBVH + earliest impact, 2", build + search)
+    return times
+
+
+def processor() -> str:
+    """Name the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or "unknown"
+
+
+def main() -> None:
+    """Measure and print one table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=5, help="rounds (default 5)")
+    parser.add_argument("--scenes", nargs="*", default=["cloth-ball"], choices=SCENES, metavar="NAME", help="frame pairs")
+    parser.add_argument("--json", type=Path, help="also write all times [s] to this file")
+    options = parser.parse_args()
+
+    load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "?"
+    machine = f"{processor()}, {os.cpu_count()} cores, load {load} at the start"
+    versions = f"clothsim {cs.__version__}, ipctk {ipctk.__version__}, numpy {np.__version__}, python {platform.python_version()}"
+    print(f"{machine}\n{versions}\n{options.repeats} rounds, milliseconds\n")
+    report: dict[str, object] = {"machine": machine, "versions": versions, "scenes": {}}
+    pairs = [
+        ("ipctk LBVH + additive CCD, all, 1", "detect, 1"),
+        ("ipctk LBVH + earliest impact, 2", "detect, 2"),
+        ("ipctk has_intersections, 1", "self_intersections, 1"),
+        ("ipctk has_intersections, 2", "self_intersections, 2"),
+    ]
+    for scene in options.scenes:
+        times = measure(scene, options.repeats)
+        report["scenes"][scene] = times  # type: ignore[index]
+        print(f"{scene:<38}{'median':>9}{'least':>9}{'most':>9}")
+        for name, values in times.items():
+            print(f"  {name:<36}{statistics.median(values) * 1e3:9.1f}{min(values) * 1e3:9.1f}{max(values) * 1e3:9.1f}")
+        for theirs, ours in pairs:
+            ratio = statistics.median(times[theirs]) / statistics.median(times[ours])
+            print(f"  {theirs} / {ours}: {ratio:.1f}")
+        print()
+    if options.json:
+        options.json.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
