@@ -165,7 +165,7 @@ pub(crate) fn build(
         "integrator",
         format!("time.integrator = \"{}\"", kebab(&method)),
         bodies.cloth_vertices,
-        4 * size_of_val(&state.x[..bodies.cloth_vertices]),
+        integrator.bytes(),
     );
     let explicit = method.is_explicit();
     if explicit {
@@ -173,7 +173,7 @@ pub(crate) fn build(
     } else {
         effects.on(
             "linear solver",
-            format!("solver.method = \"{}\"", kebab(&scene.solver.method)),
+            format!("solver.method = \"{}\" (its memory is the integrator's)", kebab(&scene.solver.method)),
             bodies.cloth_vertices,
             0,
         );

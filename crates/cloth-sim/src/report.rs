@@ -120,9 +120,24 @@ pub struct EffectCost {
     pub elements: usize,
     /// Memory of its data [B].
     pub bytes: usize,
-    /// Milliseconds in all steps so far; `None` where it is part of another stage.
+    /// Milliseconds in all steps so far; `None` for an effect that is timed as part of another (a force model as part of
+    /// the integrator, self-contact and friction as part of contact).
     pub milliseconds: Option<f64>,
 }
+
+/// The effect that a stage of the step is counted under: an effect of the stage's own name, or one of these.
+const STAGES: [(&str, &str); 10] = [
+    ("forces", "integrator"),
+    ("linearise", "integrator"),
+    ("assemble", "integrator"),
+    ("line search", "integrator"),
+    ("solve", "linear solver"),
+    ("proximity", "contact"),
+    ("impulses", "contact"),
+    ("detection", "contact"),
+    ("zones", "contact"),
+    ("hold", "contact"),
+];
 
 impl Report {
     /// Adds a step and its wall-clock seconds.
@@ -143,9 +158,9 @@ impl Report {
         for (name, seconds) in &step.seconds {
             add_seconds(&mut t.seconds, name, *seconds);
         }
-        for effect in &mut self.effects {
-            let stages = step.seconds.iter().filter(|(name, _)| *name == effect.name);
-            for (_, seconds) in stages {
+        for (stage, seconds) in &step.seconds {
+            let name = STAGES.iter().find(|(known, _)| known == stage).map_or(stage.as_str(), |s| s.1);
+            if let Some(effect) = self.effects.iter_mut().find(|e| e.name == name) {
                 *effect.milliseconds.get_or_insert(0.0) += 1e3 * seconds;
             }
         }

@@ -201,10 +201,8 @@ impl Simulation {
         }
         let (mut x, mut v) = (self.state.x.clone(), self.state.v.clone());
 
-        let clock = Instant::now();
-        let (pin_x, pin_v) = self.prescribe(t1, dt, &mut x, &mut v);
-        add_seconds(&mut report.seconds, "prescribed", clock.elapsed().as_secs_f64());
-
+        self.move_colliders(t1, dt, &mut x, &mut v, report);
+        let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
         let dynamics = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         if let Some(info) = self.response(dt, &mut x, &mut v, report)? {
@@ -274,23 +272,34 @@ impl Simulation {
         Ok(Some(info))
     }
 
-    /// Writes where colliders and pins are at `t1`, and the mean velocity of their way there.
-    fn prescribe(&self, t1: f64, dt: f64, x: &mut [Vec3], v: &mut [Vec3]) -> (Vec<Vec3>, Vec<Vec3>) {
-        let x_t0 = &self.state.x;
-        for body in &self.bodies.colliders {
-            if !body.motion.moves() {
-                continue;
-            }
+    /// Writes where colliders are at `t1`, and the mean velocity of their way there.
+    fn move_colliders(&self, t1: f64, dt: f64, x: &mut [Vec3], v: &mut [Vec3], report: &mut StepReport) {
+        let clock = Instant::now();
+        let mut any = false;
+        for body in self.bodies.colliders.iter().filter(|body| body.motion.moves()) {
             let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
             body.motion.write(t1, &mut x[range.clone()]);
             for i in range {
-                v[i] = (x[i] - x_t0[i]) / dt;
+                v[i] = (x[i] - self.state.x[i]) / dt;
             }
+            any = true;
         }
+        if any {
+            add_seconds(&mut report.seconds, "moving colliders", clock.elapsed().as_secs_f64());
+        }
+    }
+
+    /// Where pins are at `t1`, when colliders are as in `x`, and the mean velocity of their way there.
+    fn move_pins(&self, t1: f64, dt: f64, x: &[Vec3], report: &mut StepReport) -> (Vec<Vec3>, Vec<Vec3>) {
+        if self.pins.vertices.is_empty() {
+            return (Vec::new(), Vec::new());
+        }
+        let clock = Instant::now();
         let mut pin_x = vec![Vec3::zeros(); self.pins.vertices.len()];
         self.pins.write(&self.bodies, t1, x, &mut pin_x);
-        let pin_v =
-            self.pins.vertices.iter().zip(&pin_x).map(|(&i, p)| (p - x_t0[i as usize]) / dt).collect();
+        let start = |i: u32| self.state.x[i as usize];
+        let pin_v = self.pins.vertices.iter().zip(&pin_x).map(|(&i, p)| (p - start(i)) / dt).collect();
+        add_seconds(&mut report.seconds, "pins", clock.elapsed().as_secs_f64());
         (pin_x, pin_v)
     }
 

@@ -218,6 +218,10 @@ fn the_report_adds_up() {
     }
     let staged: f64 = report.totals.seconds.iter().map(|(_, s)| s).sum();
     assert!(staged <= report.totals.wall_seconds * 1.0001, "{staged} of {}", report.totals.wall_seconds);
+    let cost = |name: &str| report.effects.iter().find(|e| e.name == name).expect("an effect").milliseconds;
+    let timed: f64 = report.effects.iter().filter_map(|e| e.milliseconds).sum();
+    assert!((timed - 1e3 * staged).abs() < 1e-6, "every stage is counted under an effect: {report:?}");
+    assert!(cost("contact") > Some(0.0) && cost("linear solver") > Some(0.0) && cost("friction").is_none());
     let json = serde_json::to_string(report).unwrap();
     assert_eq!(&serde_json::from_str::<cloth_sim::Report>(&json).unwrap(), report);
 }

@@ -2,6 +2,7 @@
 
 use cloth_sim::scene::{MaterialChoice, Up};
 use cloth_sim::{Scene, SceneError};
+use proptest::prelude::*;
 
 /// Every table and most keys.
 const FULL: &str = r#"name = "table"
@@ -274,4 +275,20 @@ fn the_schema_lists_every_key_of_a_scene() {
         assert!(schema["properties"].get(key).is_some_and(|s| s.get("description").is_some()), "{key}");
     }
     assert_eq!(schema["additionalProperties"], serde_json::Value::Bool(false));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A scene file with a piece cut out, doubled or replaced is read or refused, and refused within its lines.
+    #[test]
+    fn damaged_files_are_refused_in_place(start in 0..FULL.len(), length in 0usize..40, with in "[a-z0-9=\\[\\]{}\", .\n-]{0,6}") {
+        let end = (start + length).min(FULL.len());
+        let text = format!("{}{with}{}", &FULL[..start], &FULL[end..]);
+        if let Err(error) = parse(&text) {
+            let lines = text.lines().count() + 1;
+            prop_assert!(error.line.is_some_and(|line| (1..=lines).contains(&line)), "{error}");
+            prop_assert!(!error.expected.is_empty() && !error.got.is_empty(), "{error}");
+        }
+    }
 }
