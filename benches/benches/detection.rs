@@ -9,7 +9,8 @@
 
 use cloth_collision::mesh::{Vec3, generators};
 use cloth_collision::{
-    BruteForce, Bvh, CollisionMesh, Detector, Mode, Query, edge_edge_ccd, self_intersections, vertex_triangle_ccd,
+    BruteForce, Bvh, CollisionMesh, Detector, Mode, Query, edge_edge_ccd, self_intersections,
+    vertex_triangle_ccd,
 };
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -36,7 +37,9 @@ fn folded(n: usize, gap: f64, sink: f64) -> Scene {
     let x_t1 = sheet
         .vertices
         .iter()
-        .map(|p| fold(p, gap - sink * (7.0 * p.z).sin().abs()) + Vec3::new(0.01, -0.03, 0.002 * (20.0 * p.x).sin()))
+        .map(|p| {
+            fold(p, gap - sink * (7.0 * p.z).sin().abs()) + Vec3::new(0.01, -0.03, 0.002 * (20.0 * p.x).sin())
+        })
         .collect();
     Scene { triangles: sheet.triangles, x_t0, x_t1 }
 }
