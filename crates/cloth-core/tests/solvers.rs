@@ -98,6 +98,28 @@ fn all_vertices_pinned_leaves_nothing_to_solve() {
 }
 
 #[test]
+fn sweeps_in_several_domains_solve_the_whole_system() {
+    /// Distance of velocities [m/s] at a residual of 1e-11.
+    const AGREEMENT: f64 = 1e-7;
+    // 3600 rows are three domains with blocks across.
+    let mesh = sheet(1.0, 60);
+    let target = [mesh.vertices[0] + Vec3::new(0.0, 0.003, 0.0)];
+    let pins = Pins { vertices: &[0], x_t1: &target, v_t1: &[Vec3::zeros()] };
+    let run = |method| {
+        let (mut x, mut v) = wavy(&mesh, 0.02, 0.4);
+        let mut integrator = integrator(system(&mesh, &SOFT, &Environment::default()), with(method, 1e-11));
+        let info = integrator.step(&mut x, &mut v, 0.0, 0.01, &pins).unwrap();
+        assert!(info.converged, "{method:?}: {info:?}");
+        (v, info.linear_iterations)
+    };
+    let (swept, iterations) = run(SolverMethod::Pcg);
+    let (direct, _) = run(SolverMethod::FaerLlt);
+    assert!(distance(&swept, &direct) < AGREEMENT, "{:e}", distance(&swept, &direct));
+    let (_, jacobi) = run(SolverMethod::PcgJacobi);
+    assert!(2 * iterations < jacobi, "{iterations} against {jacobi} with block-Jacobi alone");
+}
+
+#[test]
 fn bits_do_not_depend_on_threads() {
     let mesh = sheet(1.0, 60);
     let env = Environment { drag: 0.5, lift: 0.2, wind: Vec3::new(1.0, 0.0, 0.5), ..Environment::default() };

@@ -4,7 +4,7 @@ use super::{
     super::band::Band,
     rows::{Rows, oriented},
 };
-use crate::assembly::BlockMatrix;
+use crate::assembly::{BlockMatrix, Lanes};
 
 /// The coarse space.
 pub(super) struct Coarse {
@@ -13,13 +13,18 @@ pub(super) struct Coarse {
     /// Entries of T ᵀW of row i: `offsets[i]..offsets[i + 1]`, the row's own aggregate first.
     pub(super) offsets: Vec<u32>,
     pub(super) columns: Vec<u32>,
+    /// One more block at the end, so that any column can be read four wide.
     pub(super) values: Vec<[f64; 9]>,
     /// Entry that each upper block inside a domain counts to.
     pub(super) slots: Vec<u32>,
     pub(super) band: Band,
+    /// Aggregates that the rows of each domain touch: first, and one past the last.
+    pub(super) reach: Vec<[u32; 2]>,
     /// Restricted residual and its solution, three values per aggregate.
     pub(super) residual: Vec<f64>,
-    pub(super) solution: Vec<f64>,
+    scratch: Vec<f64>,
+    /// The solution, one vector per aggregate.
+    pub(super) solution: Vec<Lanes>,
 }
 
 impl Coarse {
@@ -41,13 +46,13 @@ impl Coarse {
             .collect();
         let (mut offsets, mut columns) = (vec![0u32], Vec::new());
         let mut slots = vec![0u32; rows.columns.len()];
-        let mut reach = 0;
+        let mut width = 0;
         for i in 0..rows.len() {
             let first = columns.len();
             columns.push(aggregate[i]);
             for k in rows.upper[i] as usize..rows.upper[i + 1] as usize {
                 let other = aggregate[rows.columns[k] as usize];
-                reach = reach.max(other.abs_diff(aggregate[i]));
+                width = width.max(other.abs_diff(aggregate[i]));
                 if k < rows.middle[i] as usize {
                     let known = columns[first..].iter().position(|&c| c == other);
                     slots[k] = (first + known.unwrap_or(columns.len() - first)) as u32;
@@ -58,16 +63,24 @@ impl Coarse {
             }
             offsets.push(columns.len() as u32);
         }
+        let reach_of = |d: usize| {
+            let entries = offsets[rows.domains[d]] as usize..offsets[rows.domains[d + 1]] as usize;
+            let touched = columns[entries].iter();
+            [touched.clone().min().map_or(0, |c| *c), touched.max().map_or(0, |c| *c + 1)]
+        };
+        let reach = (0..rows.domains()).map(reach_of).collect();
         let size = 3 * count;
         Self {
             aggregate,
             offsets,
-            values: vec![[0.0; 9]; columns.len()],
+            reach,
+            values: vec![[0.0; 9]; columns.len() + 1],
             columns,
             slots,
-            band: Band::new(size, 3 * reach as usize + 2),
+            band: Band::new(size, 3 * width as usize + 2),
             residual: vec![0.0; size],
-            solution: vec![0.0; size],
+            scratch: vec![0.0; size],
+            solution: vec![Lanes::ZERO; count],
         }
     }
 
@@ -75,6 +88,18 @@ impl Coarse {
         4 * (self.aggregate.len() + self.offsets.len() + self.columns.len() + self.slots.len())
             + size_of_val(self.values.as_slice())
             + self.band.bytes()
+    }
+}
+
+impl Coarse {
+    /// Coarse solution y of the restricted residual; returns their dot product.
+    pub(super) fn solve(&mut self) -> f64 {
+        self.scratch.copy_from_slice(&self.residual);
+        self.band.solve(&mut self.scratch);
+        for (lanes, y) in self.solution.iter_mut().zip(self.scratch.as_chunks::<3>().0) {
+            *lanes = Lanes([y[0], y[1], y[2], 0.0]);
+        }
+        self.residual.iter().zip(&self.scratch).map(|(r, y)| r * y).sum()
     }
 }
 

@@ -5,33 +5,50 @@
     reason = "compiled once per instruction set: only inlined code has the caller's features"
 )]
 
-use super::{SIGMA, rows::Rows};
+use super::{SIGMA, coarse::Coarse, rows::Rows};
 use crate::assembly::{
     Lanes,
     simd::{self, Four},
 };
 
+/// Defines a function that calls a generic kernel with the widest lanes of the processor.
+macro_rules! for_processor {
+    ($name:ident = $kernel:ident($($arg:ident: $type:ty),*) -> $out:ty) => {
+        /// # Safety
+        /// That of the kernel, but for the processor's features.
+        unsafe fn $name($($arg: $type),*) -> $out {
+            #[cfg(target_arch = "x86_64")]
+            if simd::has_avx() {
+                #[target_feature(enable = "avx")]
+                unsafe fn with_avx($($arg: $type),*) -> $out {
+                    // SAFETY: this function is compiled for AVX; the rest is the caller's.
+                    unsafe { $kernel::<simd::Avx>($($arg),*) }
+                }
+                // SAFETY: the processor has AVX; the rest is the caller's.
+                return unsafe { with_avx($($arg),*) };
+            }
+            // SAFETY: the portable lanes need no feature; the rest is the caller's.
+            unsafe { $kernel::<simd::Array>($($arg),*) }
+        }
+    };
+}
+
+for_processor!(backward_any = backward_with(rows: &Rows, upper: &[f64], d: usize, p: &[Lanes], t: &mut [Lanes]) -> ());
+for_processor!(forward_any = forward_with(rows: &Rows, upper: &[f64], d: usize, p: &[Lanes], t: Option<&[Lanes]>, s: &mut [Lanes]) -> f64);
+for_processor!(prolong_any = prolong_with(coarse: &Coarse, first: usize, r: &[Lanes], beta: f64, p: &mut [Lanes]) -> ());
+for_processor!(restrict_any = restrict_with(coarse: &Coarse, first: usize, lowest: usize, r: &[Lanes], sums: &mut [[Lanes; 3]]) -> ());
+for_processor!(residual_any = residual_with(rows: &Rows, upper: &[f64], d: usize, scale: &[[f64; 9]], r: &[Lanes]) -> f64);
+
 /// Solves (σ I + U) t = p inside domain `d`; `p` and `t` are the domain's rows.
 pub(super) fn backward(rows: &Rows, upper: &[f64], d: usize, p: &[Lanes], t: &mut [Lanes]) {
     let (first, end) = (rows.domains[d], rows.domains[d + 1]);
     assert!(p.len() == end - first && t.len() == p.len() && upper.len() >= 9 * rows.columns.len() + 3);
-    #[cfg(target_arch = "x86_64")]
-    if simd::has_avx() {
-        #[target_feature(enable = "avx")]
-        unsafe fn with_avx(rows: &Rows, upper: &[f64], d: usize, p: &[Lanes], t: &mut [Lanes]) {
-            // SAFETY: this function is compiled for AVX; the lengths are the caller's to check.
-            unsafe { backward_with::<simd::Avx>(rows, upper, d, p, t) };
-        }
-        // SAFETY: the processor has AVX; lengths are asserted above.
-        unsafe { with_avx(rows, upper, d, p, t) };
-        return;
-    }
-    // SAFETY: the portable lanes need no feature; lengths are asserted above.
-    unsafe { backward_with::<simd::Array>(rows, upper, d, p, t) };
+    // SAFETY: lengths are asserted; columns and blocks are in range by the pattern's construction.
+    unsafe { backward_any(rows, upper, d, p, t) };
 }
 
-/// s = (σ I + Uᵀ)⁻¹ w inside domain `d`, with w = p, or p + (1 − 2σ) t + C t where `t` is given; `p` and `t` are
-/// all rows, `s` the domain's. Returns p·(s + t).
+/// s = (σ I + Uᵀ)⁻¹ w inside domain `d`, with w = p, or p + (1 − 2σ) t + C t where `t` is given; `p` and `t` are all rows,
+/// `s` the domain's. Returns p·(s + t).
 pub(super) fn forward(
     rows: &Rows,
     upper: &[f64],
@@ -43,25 +60,30 @@ pub(super) fn forward(
     let (first, end) = (rows.domains[d], rows.domains[d + 1]);
     assert!(s.len() == end - first && p.len() == rows.len() && upper.len() >= 9 * rows.columns.len() + 3);
     assert!(t.is_none_or(|t| t.len() == rows.len()));
-    #[cfg(target_arch = "x86_64")]
-    if simd::has_avx() {
-        #[target_feature(enable = "avx")]
-        unsafe fn with_avx(
-            rows: &Rows,
-            upper: &[f64],
-            d: usize,
-            p: &[Lanes],
-            t: Option<&[Lanes]>,
-            s: &mut [Lanes],
-        ) -> f64 {
-            // SAFETY: this function is compiled for AVX; the lengths are the caller's to check.
-            unsafe { forward_with::<simd::Avx>(rows, upper, d, p, t, s) }
-        }
-        // SAFETY: the processor has AVX; lengths are asserted above.
-        return unsafe { with_avx(rows, upper, d, p, t, s) };
-    }
-    // SAFETY: the portable lanes need no feature; lengths are asserted above.
-    unsafe { forward_with::<simd::Array>(rows, upper, d, p, t, s) }
+    // SAFETY: lengths are asserted; columns and blocks are in range by the pattern's construction.
+    unsafe { forward_any(rows, upper, d, p, t, s) }
+}
+
+/// p = r + Tᵀ W y + β p for the rows from `first`; `r` and `p` are those rows.
+pub(super) fn prolong(coarse: &Coarse, first: usize, r: &[Lanes], beta: f64, p: &mut [Lanes]) {
+    assert!(r.len() == p.len() && first + p.len() < coarse.offsets.len());
+    // SAFETY: lengths are asserted; entries and aggregates are in range by construction of the coarse space.
+    unsafe { prolong_any(coarse, first, r, beta, p) };
+}
+
+/// Adds (Tᵀ W)ᵀ r of the rows of domain `d` to `sums`, lane by lane; `sums` starts at the domain's lowest aggregate.
+pub(super) fn restrict(coarse: &Coarse, rows: &Rows, d: usize, r: &[Lanes], sums: &mut [[Lanes; 3]]) {
+    let [low, high] = coarse.reach[d];
+    assert!(sums.len() == (high - low) as usize && r.len() == rows.domains[d + 1] - rows.domains[d]);
+    // SAFETY: lengths are asserted; the domain's entries lie in its reach by construction of the coarse space.
+    unsafe { restrict_any(coarse, rows.domains[d], low as usize, r, sums) };
+}
+
+/// Square of the norm of G T r over the rows of domain `d`; `scale` and `r` are all rows.
+pub(super) fn residual(rows: &Rows, upper: &[f64], d: usize, scale: &[[f64; 9]], r: &[Lanes]) -> f64 {
+    assert!(r.len() == rows.len() && scale.len() == r.len() && upper.len() >= 9 * rows.columns.len() + 3);
+    // SAFETY: lengths are asserted; columns and blocks are in range by the pattern's construction.
+    unsafe { residual_any(rows, upper, d, scale, r) }
 }
 
 /// # Safety
@@ -149,6 +171,93 @@ unsafe fn forward_with<F: Four>(
         }
     }
     dot
+}
+
+/// # Safety
+/// The processor has `F`'s features; lengths as asserted by `prolong`; entries of `coarse` are in range.
+#[inline(always)]
+unsafe fn prolong_with<F: Four>(coarse: &Coarse, first: usize, r: &[Lanes], beta: f64, p: &mut [Lanes]) {
+    let blocks = coarse.values.as_ptr().cast::<f64>();
+    for i in 0..p.len() {
+        // SAFETY: by contract; `values` is padded by one block.
+        unsafe {
+            let mut z = F::load(r.get_unchecked(i).0.as_ptr());
+            let start = *coarse.offsets.get_unchecked(first + i) as usize;
+            for e in start..*coarse.offsets.get_unchecked(first + i + 1) as usize {
+                let y = coarse.solution.get_unchecked(*coarse.columns.get_unchecked(e) as usize);
+                z = z.add(product::<F>(blocks.add(9 * e), y));
+            }
+            let p = p.get_unchecked_mut(i);
+            let mut sum = z.add(F::load(p.0.as_ptr()).multiply(F::splat(beta))).lanes();
+            sum.0[3] = 0.0;
+            *p = sum;
+        }
+    }
+}
+
+/// # Safety
+/// The processor has `F`'s features; lengths as asserted by `restrict`; entries of `coarse` are in range.
+#[inline(always)]
+unsafe fn restrict_with<F: Four>(
+    coarse: &Coarse,
+    first: usize,
+    lowest: usize,
+    r: &[Lanes],
+    sums: &mut [[Lanes; 3]],
+) {
+    let blocks = coarse.values.as_ptr().cast::<f64>();
+    for i in 0..r.len() {
+        // SAFETY: by contract; `values` is padded by one block.
+        unsafe {
+            let start = *coarse.offsets.get_unchecked(first + i) as usize;
+            for e in start..*coarse.offsets.get_unchecked(first + i + 1) as usize {
+                let sum = sums.get_unchecked_mut(*coarse.columns.get_unchecked(e) as usize - lowest);
+                let mut columns = [0, 1, 2].map(|c| F::load(sum[c].0.as_ptr()));
+                transposed::<F>(blocks.add(9 * e), r.get_unchecked(i), &mut columns);
+                for c in 0..3 {
+                    sum[c] = columns[c].lanes();
+                }
+            }
+        }
+    }
+}
+
+/// # Safety
+/// The processor has `F`'s features; lengths as asserted by `residual`; columns and blocks of `rows` are in range.
+#[inline(always)]
+unsafe fn residual_with<F: Four>(
+    rows: &Rows,
+    upper: &[f64],
+    d: usize,
+    scale: &[[f64; 9]],
+    r: &[Lanes],
+) -> f64 {
+    let mut squares = 0.0;
+    for row in rows.domains[d]..rows.domains[d + 1] {
+        // SAFETY: by contract.
+        unsafe {
+            let mut columns = [F::zero(); 3];
+            for e in rows.lower[row] as usize..rows.lower_middle[row] as usize {
+                let [j, k] = *rows.lower_entries.get_unchecked(e);
+                transposed::<F>(
+                    upper.as_ptr().add(9 * k as usize),
+                    r.get_unchecked(j as usize),
+                    &mut columns,
+                );
+            }
+            let sums = total(columns);
+            let r = r.get_unchecked(row);
+            // G⁻¹ is lower triangular: solve for G y.
+            let h = scale.get_unchecked(row);
+            if h[0] > 0.0 {
+                let a = (SIGMA * r.0[0] + sums[0]) / h[0];
+                let b = ((SIGMA * r.0[1] + sums[1]) - h[1] * a) / h[4];
+                let c = ((SIGMA * r.0[2] + sums[2]) - h[2] * a - h[5] * b) / h[8];
+                squares += a * a + b * b + c * c;
+            }
+        }
+    }
+    squares
 }
 
 /// Block times vector.
