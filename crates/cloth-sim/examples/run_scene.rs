@@ -3,6 +3,7 @@
 //! `cargo run --release -p cloth-sim --example run_scene -- examples/drape.toml [seconds] [threads]`
 #![allow(clippy::print_stdout, reason = "a command line example")]
 
+use cloth_sim::core::mesh::Vec3;
 use cloth_sim::{Assets, Scene, Simulation, SimulationOptions};
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -27,7 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if frame % (scene.output.fps / 10.0).max(1.0) as usize == 0 {
             let totals = &sim.report().totals;
             let contact = sim.report().steps.last().and_then(|s| s.contact.clone()).unwrap_or_default();
-            let fastest = sim.velocities().iter().map(|v| v.norm()).fold(0.0, f64::max);
+            let fastest = sim.velocities().iter().map(Vec3::norm).fold(0.0, f64::max);
             println!(
                 "t {:.2} s  energy {:9.4} J ({}) fastest {fastest:6.3} m/s  pcg {:5}  near {:6}  passes {}  impulses {:5}  \
                  zones {:3}  held {:4}  retries {}  intersections {pairs}  wall {:.1} s",

@@ -24,6 +24,7 @@ impl Simulation {
         payload.u64(self.state.step);
         payload.points(&self.state.x);
         payload.points(&self.state.v);
+        payload.points(&self.state.contact_force);
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
         payload.u64(pending.steps);
         payload.f64(pending.dt);
@@ -54,7 +55,11 @@ impl Simulation {
             allow_intersections: payload.u64()? != 0,
         };
         let (time, step) = (payload.f64()?, payload.u64()?);
-        let (x, v) = (payload.points()?, payload.points()?);
+        let (x, v, contact_force) = (payload.points()?, payload.points()?, payload.points()?);
+        if !contact_force.is_empty() && contact_force.len() != x.len() {
+            let got = format!("{} and {}", contact_force.len(), x.len());
+            return Err(invalid("as many contact forces as positions", got));
+        }
         if x.len() != v.len() {
             return Err(invalid("as many velocities as positions", format!("{} and {}", v.len(), x.len())));
         }
@@ -64,7 +69,7 @@ impl Simulation {
         if !payload.0.is_empty() {
             return Err(invalid("the end of the payload", format!("{} more bytes", payload.0.len())));
         }
-        let mut sim = Self::build(&scene, assets, options, Some(State { time, step, x, v }))?;
+        let mut sim = Self::build(&scene, assets, options, Some(State { time, step, x, v, contact_force }))?;
         sim.pending = (pending.steps > 0).then_some(pending);
         let threads = sim.report.threads;
         sim.report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;

@@ -75,11 +75,8 @@ pub enum SimError {
 }
 
 fn list<T: std::fmt::Display>(items: &[T]) -> String {
-    let mut text = items.iter().take(SHOWN).map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    if items.len() > SHOWN {
-        text += &format!(", … ({} in all)", items.len());
-    }
-    text
+    let text = items.iter().take(SHOWN).map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    if items.len() > SHOWN { format!("{text}, … ({} in all)", items.len()) } else { text }
 }
 
 #[cfg(test)]

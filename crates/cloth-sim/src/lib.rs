@@ -7,6 +7,8 @@
 //! One global vertex array: the vertices of all cloth in scene order, then those of all colliders. Prescribed vertices
 //! (colliders, pins) have a known end of each step and infinite mass.
 
+#![allow(clippy::result_large_err, reason = "an error ends the load or the run: its size costs nothing")]
+
 pub use cloth_collision as collision;
 pub use cloth_core as core;
 pub use cloth_response as response;

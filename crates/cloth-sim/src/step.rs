@@ -21,6 +21,8 @@ pub(crate) struct State {
     pub(crate) step: u64,
     pub(crate) x: Vec<Vec3>,
     pub(crate) v: Vec<Vec3>,
+    /// What contact did to each vertex in the last step \[N\]; empty in a scene without contact.
+    pub(crate) contact_force: Vec<Vec3>,
 }
 
 impl State {
@@ -38,7 +40,7 @@ impl State {
             let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
             body.motion.write(0.0, &mut x[range]);
         }
-        Self { time: 0.0, step: 0, x, v }
+        Self { time: 0.0, step: 0, x, v, contact_force: Vec::new() }
     }
 
     /// Moves pinned vertices to where their motion starts, at rest.
@@ -203,8 +205,11 @@ impl Simulation {
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
         let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
+        self.expect_contact(dt, &mut v);
         let dynamics = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
+        self.forget_contact(dt, &mut x, &mut v);
         self.check(&x, &v, report)?;
+        let v_free = self.contact.is_some().then(|| v.clone());
         if let Some(info) = self.response(dt, &mut x, &mut v, report)? {
             self.check(&x, &v, report)?;
             report.contact.get_or_insert_default().add(&info);
@@ -214,10 +219,41 @@ impl Simulation {
         report.linear_iterations += dynamics.linear_iterations;
         report.residual = report.residual.max(dynamics.residual);
         report.converged &= dynamics.converged;
+        if let Some(v_free) = v_free {
+            let force = |i: usize| {
+                if self.inv_mass[i] > 0.0 {
+                    (v[i] - v_free[i]) / (dt * self.inv_mass[i])
+                } else {
+                    Vec3::zeros()
+                }
+            };
+            self.state.contact_force = (0..v.len()).map(force).collect();
+        }
         self.state.x = x;
         self.state.v = v;
         self.state.time = t1;
         Ok(())
+    }
+
+    /// Adds the impulse that contact is expected to give, dt f/m with the force f of the last step.
+    ///
+    /// Response works on single vertices, the implicit step on all that hang together: cloth that presses on a collider
+    /// would give way inwards as a whole and be put back vertex by vertex, stretched. With the expected force the
+    /// implicit step finds the balance that contact will keep. [`Simulation::forget_contact`] takes the same impulse
+    /// out again, so that response decides freshly: a contact that is gone leaves nothing.
+    fn expect_contact(&self, dt: f64, v: &mut [Vec3]) {
+        for (i, force) in self.state.contact_force.iter().enumerate() {
+            v[i] += force * (dt * self.inv_mass[i]);
+        }
+    }
+
+    /// Takes the expected impulse out of the velocity and of the motion.
+    fn forget_contact(&self, dt: f64, x: &mut [Vec3], v: &mut [Vec3]) {
+        for (i, force) in self.state.contact_force.iter().enumerate() {
+            let change = force * (dt * self.inv_mass[i]);
+            v[i] -= change;
+            x[i] -= change * dt;
+        }
     }
 
     /// The end of the step without contact.

@@ -28,7 +28,7 @@ fn mesh_error(mesh: TriMesh) -> String {
 }
 
 fn sheet() -> TriMesh {
-    generators::grid(1.0, 1.0, 3, 3).unwrap()
+    generators::grid(1.0, 1.0, 3, 3).expect("a grid")
 }
 
 #[test]

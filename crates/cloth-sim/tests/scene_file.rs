@@ -1,5 +1,7 @@
 //! Scene files: read, written, refused with file, line and key.
 
+#![allow(clippy::result_large_err, reason = "an error ends the load: its size costs nothing")]
+
 use cloth_sim::scene::{MaterialChoice, Up};
 use cloth_sim::{Scene, SceneError};
 use proptest::prelude::*;

@@ -16,8 +16,6 @@ impl Scene {
         self.positive("time.dt", self.time.dt, "s")?;
         self.positive("time.newton_tolerance", self.time.newton_tolerance, "")?;
         self.at_least_one("time.newton_max_iterations", self.time.newton_max_iterations)?;
-        /// 2¹⁶ sub-steps of one step; a step that still fails is stuck.
-        const MAX_HALVINGS: u32 = 16;
         if self.time.max_halvings > MAX_HALVINGS {
             return Err(self.error("time.max_halvings", "0 to 16", self.time.max_halvings.to_string()));
         }
@@ -241,6 +239,9 @@ impl Scene {
         if value > 0 { Ok(()) } else { Err(self.error(key, "an integer ≥ 1", "0")) }
     }
 }
+
+/// 2¹⁶ sub-steps of one step; a step that still fails is stuck.
+const MAX_HALVINGS: u32 = 16;
 
 /// Names that [`cloth_collision::detector`] takes.
 const DETECTORS: [&str; 2] = ["bvh", "brute"];

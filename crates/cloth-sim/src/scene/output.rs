@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// What a run writes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[allow(clippy::struct_excessive_bools, reason = "independent switches, as a scene file writes them")]
 pub struct Output {
     /// Frames per second of simulated time, > 0.
     pub fps: f64,

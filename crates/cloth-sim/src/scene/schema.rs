@@ -22,7 +22,7 @@ impl<'a> Checker<'a> {
         if let Some(variants) = variants(schema) {
             return self.check_variants(schema, variants, node, path);
         }
-        if let Some(choices) = self.choices(schema) {
+        if let Some(choices) = Self::choices(schema) {
             return match &node.value {
                 Value::String(s) if choices.contains(&s.as_str()) => Ok(()),
                 Value::String(s) => {
@@ -197,7 +197,7 @@ impl<'a> Checker<'a> {
     }
 
     /// The strings of an enumeration, written as `enum` or as one `const` per variant.
-    fn choices(&self, schema: &'a Json) -> Option<Vec<&'a str>> {
+    fn choices(schema: &'a Json) -> Option<Vec<&'a str>> {
         if let Some(list) = schema.get("enum").and_then(Json::as_array) {
             return Some(list.iter().filter_map(Json::as_str).collect());
         }
@@ -205,13 +205,13 @@ impl<'a> Checker<'a> {
             return Some(value.as_str().into_iter().collect());
         }
         let list = schema.get("oneOf")?.as_array()?;
-        list.iter().map(|v| self.choices(v)).collect::<Option<Vec<_>>>().map(|v| v.concat())
+        list.iter().map(Self::choices).collect::<Option<Vec<_>>>().map(|v| v.concat())
     }
 
     /// What the schema allows, in words.
     fn describe(&self, schema: &'a Json) -> String {
         let schema = self.resolve(schema);
-        if let Some(choices) = self.choices(schema) {
+        if let Some(choices) = Self::choices(schema) {
             return format!("one of {}", quoted(&choices));
         }
         if let Some(list) = variants(schema) {

@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn a_line_is_found_for_keys_within() {
-        let lines = [("".to_string(), 1), ("cloth[0]".into(), 4), ("cloth[0].pins".into(), 9)].into();
+        let lines = [(String::new(), 1), ("cloth[0]".into(), 4), ("cloth[0].pins".into(), 9)].into();
         let source = Source { file: Some("a.toml".into()), lines };
         assert_eq!(source.line("cloth[0].pins[3].vertices[1]"), Some(9));
         assert_eq!(source.line("cloth[0].mesh"), Some(4));

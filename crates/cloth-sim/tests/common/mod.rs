@@ -1,6 +1,7 @@
 //! Scenes that several tests share.
 
 #![allow(dead_code, reason = "each test binary uses some of these")]
+#![allow(clippy::result_large_err, reason = "an error ends the test: its size costs nothing")]
 
 use cloth_sim::core::mesh::Vec3;
 use cloth_sim::{Assets, Scene, SimError, Simulation, SimulationOptions};
