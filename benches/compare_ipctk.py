@@ -1,16 +1,17 @@
 """Detection beside IPC Toolkit on the published frame pairs, in one run.
 
-Usage: ``python benches/compare_ipctk.py [--repeats N] [--scenes NAME ...] [--json FILE]``. Needs ``clothsim``, ``numpy`` and
-``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA`` or ``../shared/data``.
+Usage: ``python benches/compare_ipctk.py [--repeats N] [--scenes NAME ...] [--json FILE]``. Needs ``clothsim``,
+``numpy`` and ``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA`` or ``../shared/data``.
 
 What is timed, per scene, medians over the repeats, rounds interleaved so that all see the same machine:
 
-* ours: ``clothsim.collision.detect`` as a user calls it (checks, topology, tree, detection, arrays), 1 and 2 threads: every colliding
-  pair with its time. ``self_intersections`` likewise: every pair.
-* IPC Toolkit, 1 thread: ``Candidates.build`` with ``LBVH``; then additive CCD over all candidates. Its Python face has no call for
-  that, so a seeded sample of candidates is timed one by one, the cost of such a call is measured with a candidate
+* ours: ``clothsim.collision.detect`` as a user calls it (checks, topology, tree, detection, arrays), 1 and 2 threads:
+  every colliding pair with its time. ``self_intersections`` likewise: every pair.
+* IPC Toolkit, 1 thread: ``Candidates.build`` with ``LBVH``; then additive CCD over all candidates. Its Python face has
+  no call for that, so a seeded sample of candidates is timed one by one, the cost of such a call is measured with a candidate
   that ends at once (``tmax`` = 0) and subtracted, and the rest is scaled to all of them.
-* IPC Toolkit, 2 threads: the same build, then ``compute_collision_free_stepsize`` with ``AdditiveCCD``: the earliest impact only.
+* IPC Toolkit, 2 threads: the same build, then ``compute_collision_free_stepsize`` with ``AdditiveCCD``: the earliest
+  impact only.
 * IPC Toolkit ``has_intersections``, 1 and 2 threads: whether there is any.
 """
 
@@ -122,13 +123,16 @@ def main() -> None:
     """Measure and print one table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--repeats", type=int, default=5, help="rounds (default 5)")
-    parser.add_argument("--scenes", nargs="*", default=["cloth-ball"], choices=SCENES, metavar="NAME", help="frame pairs")
+    parser.add_argument(
+        "--scenes", nargs="*", default=["cloth-ball"], choices=SCENES, metavar="NAME", help="frame pairs"
+    )
     parser.add_argument("--json", type=Path, help="also write all times [s] to this file")
     options = parser.parse_args()
 
     load = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "?"
     machine = f"{processor()}, {os.cpu_count()} cores, load {load} at the start"
-    versions = f"clothsim {cs.__version__}, ipctk {ipctk.__version__}, numpy {np.__version__}, python {platform.python_version()}"
+    versions = f"clothsim {cs.__version__}, ipctk {ipctk.__version__}, numpy {np.__version__}"
+    versions += f", python {platform.python_version()}"
     print(f"{machine}\n{versions}\n{options.repeats} rounds, milliseconds\n")
     report: dict[str, object] = {"machine": machine, "versions": versions, "scenes": {}}
     pairs = [

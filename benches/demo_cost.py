@@ -1,7 +1,7 @@
 """What the demo's first two seconds cost, and whether they are right.
 
-Usage: ``python benches/demo_cost.py [--repeats N]``. Runs ``examples/drape.toml`` from 0 to 2 s without output and prints the
-CPU seconds of the whole process during the run (user + system, all threads), the number of intersecting triangle pairs
+Usage: ``python benches/demo_cost.py [--repeats N]``. Runs ``examples/drape.toml`` from 0 to 2 s without output and
+prints the CPU seconds of the whole process during the run (user + system, all threads), the number of intersecting triangle pairs
 over all frames, and the deepest point of the cloth below the true sphere.
 """
 
@@ -49,7 +49,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeats", type=int, default=3)
     repeats = parser.parse_args().repeats
-    print(f"clothsim {cs.__version__}, {platform.machine()}, {os.cpu_count()} CPUs, threads=2, first {SECONDS} s of {SCENE.name}")
+    machine = f"{platform.machine()}, {os.cpu_count()} CPUs"
+    print(f"clothsim {cs.__version__}, {machine}, threads=2, first {SECONDS} s of {SCENE.name}")
     results = []
     for _ in range(repeats):
         results.append(run())

@@ -10,7 +10,8 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 
-# Direct dependencies between the workspace's crates. A lower crate is reached through the re-exports of the one above it.
+# Direct dependencies between the workspace's crates. A lower crate is reached through the re-exports of the one
+# above it.
 ALLOWED: dict[str, set[str]] = {
     "cloth-mesh": set(),
     "cloth-core": {"cloth-mesh"},
