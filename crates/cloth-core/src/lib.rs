@@ -7,6 +7,8 @@
 //! SI units throughout. Every sum runs in an order that does not depend on the number of threads, so equal input gives
 //! equal bits.
 
+#![allow(rustdoc::broken_intra_doc_links, reason = "units and reference keys stand in square brackets")]
+
 pub use cloth_mesh as mesh;
 
 mod forces;
