@@ -1,14 +1,17 @@
 """Detection beside IPC Toolkit on the published frame pairs, in one run.
 
 Usage: ``python benches/compare_ipctk.py [--repeats N] [--scenes NAME ...] [--json FILE]``. Needs ``clothsim``,
-``numpy`` and ``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA`` or ``../shared/data``.
+``numpy`` and ``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA`` or
+``../shared/data``.
 
 What is timed, per scene, medians over the repeats, rounds interleaved so that all see the same machine:
 
 * ours: ``clothsim.collision.detect`` as a user calls it (checks, topology, tree, detection, arrays), 1 and 2 threads:
   every colliding pair with its time. ``self_intersections`` likewise: every pair.
-* IPC Toolkit, 1 thread: ``Candidates.build`` with ``LBVH``; then additive CCD over all candidates. Its Python face has
-  no call for that, so a seeded sample of candidates is timed one by one, the cost of such a call is measured with a candidate
+* IPC Toolkit, 1 thread: ``Candidates.build`` with ``LBVH``; then additive CCD over all candidates. Its Python face
+  has
+  no call for that, so a seeded sample of candidates is timed one by one, the cost of such a call is measured with a
+  candidate
   that ends at once (``tmax`` = 0) and subtracted, and the rest is scaled to all of them.
 * IPC Toolkit, 2 threads: the same build, then ``compute_collision_free_stepsize`` with ``AdditiveCCD``: the earliest
   impact only.

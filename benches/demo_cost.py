@@ -1,7 +1,8 @@
 """What the demo's first two seconds cost, and whether they are right.
 
 Usage: ``python benches/demo_cost.py [--repeats N]``. Runs ``examples/drape.toml`` from 0 to 2 s without output and
-prints the CPU seconds of the whole process during the run (user + system, all threads), the number of intersecting triangle pairs
+prints the CPU seconds of the whole process during the run (user + system, all threads), the number of intersecting
+triangle pairs
 over all frames, and the deepest point of the cloth below the true sphere.
 """
 
