@@ -9,10 +9,8 @@ What is timed, per scene, medians over the repeats, rounds interleaved so that a
 * ours: ``clothsim.collision.detect`` as a user calls it (checks, topology, tree, detection, arrays), 1 and 2 threads:
   every colliding pair with its time. ``self_intersections`` likewise: every pair.
 * IPC Toolkit, 1 thread: ``Candidates.build`` with ``LBVH``; then additive CCD over all candidates. Its Python face
-  has
-  no call for that, so a seeded sample of candidates is timed one by one, the cost of such a call is measured with a
-  candidate
-  that ends at once (``tmax`` = 0) and subtracted, and the rest is scaled to all of them.
+  has no call for that, so a seeded sample of candidates is timed one by one, the cost of such a call is measured with
+  a candidate that ends at once (``tmax`` = 0) and subtracted, and the rest is scaled to all of them.
 * IPC Toolkit, 2 threads: the same build, then ``compute_collision_free_stepsize`` with ``AdditiveCCD``: the earliest
   impact only.
 * IPC Toolkit ``has_intersections``, 1 and 2 threads: whether there is any.
