@@ -9,7 +9,7 @@ pub(crate) const LANES: usize = 8;
 ///
 /// Between the ends the box at t is the linear interpolation of both; it holds everything whose vertices move
 /// linearly. Two such boxes are apart during the whole step if along one axis the same one lies above the other at
-/// both ends. In a still query both ends are equal and only the first is looked at.
+/// both ends. In a still query both ends are equal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct MovingBox {
     /// `[end][axis]`
@@ -34,6 +34,18 @@ impl MovingBox {
             }
         }
         out
+    }
+
+    /// [`MovingBox::of_vertex`] of a vertex at rest.
+    #[inline]
+    pub(crate) fn of_still_vertex(x: &Vec3, origin: &Vec3, margin: f64) -> Self {
+        let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let d = x[axis] - origin[axis];
+            lo[axis] = round_down(d - margin, d);
+            hi[axis] = -round_down(-d - margin, d);
+        }
+        Self { lo: [lo; 2], hi: [hi; 2] }
     }
 
     #[inline]
@@ -100,6 +112,19 @@ impl Block {
                 self.hi[end][axis][lane] = b.hi[end][axis];
             }
         }
+    }
+
+    /// The box around all lanes.
+    #[inline]
+    pub(crate) fn hull(&self) -> MovingBox {
+        let mut b = MovingBox::EMPTY;
+        for end in 0..2 {
+            for axis in 0..3 {
+                b.lo[end][axis] = self.lo[end][axis].iter().fold(f32::INFINITY, |m, &x| m.min(x));
+                b.hi[end][axis] = self.hi[end][axis].iter().fold(f32::NEG_INFINITY, |m, &x| m.max(x));
+            }
+        }
+        b
     }
 
     #[inline(always)]

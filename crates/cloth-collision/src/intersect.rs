@@ -35,7 +35,7 @@ pub fn intersections(
     x: &[Vec3],
     pool: &rayon::ThreadPool,
 ) -> Result<Vec<[u32; 2]>, DetectError> {
-    Bvh::new(mesh, x)?.intersections(mesh, x, pool)
+    Bvh::new_in(mesh, x, pool)?.intersections(mesh, x, pool)
 }
 
 /// Whether two closed triangles have a common point (through a side of one of them; see [`intersections`]).
@@ -58,8 +58,31 @@ pub(crate) fn segment_meets_triangle(segment: &[Vec3; 2], triangle: &[Vec3; 3]) 
 
 /// On which side of the triangle's plane each point lies.
 fn heights<const N: usize>(triangle: &[Vec3; 3], points: &[Vec3; N]) -> [f64; N] {
-    let [a, b, c] = triangle.map(coord3);
-    points.map(|p| orient3d(a, b, c, coord3(p)))
+    let mut heights = [0.0; N];
+    for (height, p) in heights.iter_mut().zip(points) {
+        *height = side(&triangle[0], &triangle[1], &triangle[2], p);
+    }
+    heights
+}
+
+/// A number of the exact sign of det(a−d, b−d, c−d).
+#[inline]
+fn side(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
+    // Shewchuk's static filter, here to be inlined: the constant is his o3derrboundA for u = 2⁻⁵³.
+    const BOUND: f64 = (7.0 + 56.0 * (0.5 * f64::EPSILON)) * (0.5 * f64::EPSILON);
+    let (a0, b0, c0) = (a - d, b - d, c - d);
+    let products = [b0.x * c0.y, c0.x * b0.y, c0.x * a0.y, a0.x * c0.y, a0.x * b0.y, b0.x * a0.y];
+    let det = a0.z * (products[0] - products[1])
+        + b0.z * (products[2] - products[3])
+        + c0.z * (products[4] - products[5]);
+    let permanent = a0.z.abs() * (products[0].abs() + products[1].abs())
+        + b0.z.abs() * (products[2].abs() + products[3].abs())
+        + c0.z.abs() * (products[4].abs() + products[5].abs());
+    // Below the last number products may have lost all their digits.
+    if det.abs() > BOUND * permanent && permanent > 1e-290 && permanent < 1e290 {
+        return det;
+    }
+    orient3d(coord3(*a), coord3(*b), coord3(*c), coord3(*d))
 }
 
 fn on_one_side(heights: &[f64]) -> bool {
@@ -73,8 +96,8 @@ fn side_meets(segment: &[Vec3; 2], heights: [f64; 2], triangle: &[Vec3; 3]) -> b
     if heights == [0.0, 0.0] {
         return meets_in_plane(segment, triangle);
     }
-    let ([p, q], [a, b, c]) = (segment.map(coord3), triangle.map(coord3));
-    let turns = [orient3d(p, q, a, b), orient3d(p, q, b, c), orient3d(p, q, c, a)];
+    let ([p, q], [a, b, c]) = (segment, triangle);
+    let turns = [side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)];
     turns.iter().all(|&t| t >= 0.0) || turns.iter().all(|&t| t <= 0.0)
 }
 

@@ -21,7 +21,9 @@ pub(super) struct Tree {
 
 /// Median splits of each body's triangles along the longest axis of their centroids' box, down to full leaves; above
 /// the bodies, median splits of the bodies.
-pub(super) fn build(mesh: &CollisionMesh, x: &[Vec3]) -> Tree {
+///
+/// The split of the triangles runs on the pool, if there is one; it does not depend on it.
+pub(super) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::ThreadPool>) -> Tree {
     let mut tree = Tree::default();
     let mut items: Vec<Item> = mesh
         .triangles
@@ -39,6 +41,12 @@ pub(super) fn build(mesh: &CollisionMesh, x: &[Vec3]) -> Tree {
         .chunk_by_mut(|a, b| body_of(a) == body_of(b))
         .map(|chunk| (body_of(&chunk[0]), chunk))
         .collect();
+    for (_, items) in &mut bodies {
+        match pool {
+            Some(pool) if items.len() > PARALLEL => pool.install(|| arrange(items)),
+            _ => arrange(items),
+        }
+    }
     if !bodies.is_empty() {
         split_bodies(mesh, &mut bodies, &mut tree);
     }
@@ -64,7 +72,7 @@ fn longest_axis(centroids: impl Iterator<Item = [f32; 3]>) -> usize {
 
 fn split_bodies(mesh: &CollisionMesh, bodies: &mut [(u32, &mut [Item])], tree: &mut Tree) {
     if let [(body, items)] = bodies {
-        split_triangles(mesh, *body, items, tree);
+        push_subtree(mesh, *body, items, tree);
         return;
     }
     let middle_of = |items: &[Item]| items[items.len() / 2].centroid;
@@ -78,7 +86,35 @@ fn split_bodies(mesh: &CollisionMesh, bodies: &mut [(u32, &mut [Item])], tree: &
     split_bodies(mesh, right, tree);
 }
 
-fn split_triangles(mesh: &CollisionMesh, body: u32, items: &mut [Item], tree: &mut Tree) {
+/// Triangles from which on the two halves are arranged in parallel.
+const PARALLEL: usize = 4096;
+
+/// How many triangles the left one of two children has: full leaves, half of all, rounded up.
+fn left_count(count: usize) -> usize {
+    count.div_ceil(LEAF_TRIANGLES).div_ceil(2) * LEAF_TRIANGLES
+}
+
+/// Brings the triangles into the order of the leaves.
+fn arrange(items: &mut [Item]) {
+    if items.len() <= LEAF_TRIANGLES {
+        return;
+    }
+    let axis = longest_axis(items.iter().map(|i| i.centroid));
+    let half = left_count(items.len());
+    items.select_nth_unstable_by(half - 1, |a, b| {
+        a.centroid[axis].total_cmp(&b.centroid[axis]).then(a.triangle.cmp(&b.triangle))
+    });
+    let (left, right) = items.split_at_mut(half);
+    if left.len() + right.len() > PARALLEL && rayon::current_thread_index().is_some() {
+        rayon::join(|| arrange(left), || arrange(right));
+    } else {
+        arrange(left);
+        arrange(right);
+    }
+}
+
+/// The subtree of arranged triangles.
+fn push_subtree(mesh: &CollisionMesh, body: u32, items: &mut [Item], tree: &mut Tree) {
     let node = tree.nodes.len();
     tree.nodes.push(Node { right: NONE, leaf: NONE, body });
     if items.len() <= LEAF_TRIANGLES {
@@ -86,15 +122,10 @@ fn split_triangles(mesh: &CollisionMesh, body: u32, items: &mut [Item], tree: &m
         push_leaf(mesh, node as u32, items, tree);
         return;
     }
-    let axis = longest_axis(items.iter().map(|i| i.centroid));
-    let half = items.len().div_ceil(LEAF_TRIANGLES).div_ceil(2) * LEAF_TRIANGLES;
-    items.select_nth_unstable_by(half - 1, |a, b| {
-        a.centroid[axis].total_cmp(&b.centroid[axis]).then(a.triangle.cmp(&b.triangle))
-    });
-    let (left, right) = items.split_at_mut(half);
-    split_triangles(mesh, body, left, tree);
+    let (left, right) = items.split_at_mut(left_count(items.len()));
+    push_subtree(mesh, body, left, tree);
     tree.nodes[node].right = tree.nodes.len() as u32;
-    split_triangles(mesh, body, right, tree);
+    push_subtree(mesh, body, right, tree);
 }
 
 fn push_leaf(mesh: &CollisionMesh, node: u32, items: &mut [Item], tree: &mut Tree) {

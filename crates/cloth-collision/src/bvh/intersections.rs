@@ -2,10 +2,14 @@
 
 use super::traverse::{LeafPairs, Visit};
 use super::{Bvh, leaf_pair};
-use crate::ccd::filter::{Row, filter, four_segment_triangles_apart, four_triangles_apart, row};
+use crate::ccd::filter::{
+    Row, filter, four_segment_triangles_apart, four_segment_triangles_maybe_apart,
+    four_triangles_beside_planes, four_triangles_maybe_apart, row,
+};
 use crate::intersect::{segment_meets_triangle, triangles_meet};
 use crate::{CollisionMesh, DetectError, Mode, Query, Vec3};
 use cloth_mesh::NONE;
+use rayon::slice::ParallelSliceMut;
 
 impl Bvh {
     /// As [`crate::intersections`], with this tree.
@@ -30,11 +34,13 @@ impl Bvh {
             waiting: vec![],
             strangers: vec![],
             sides: vec![],
+            left: vec![],
+            left_sides: vec![],
             found: vec![],
         });
         let mut found: Vec<[u32; 2]> = visits.into_iter().flat_map(|v| v.found).collect();
         // Both sides of a pair with a common vertex may have met.
-        found.sort_unstable();
+        pool.install(|| found.par_sort_unstable());
         found.dedup();
         Ok(found)
     }
@@ -49,6 +55,9 @@ struct Meetings<'a> {
     strangers: Vec<[u32; 2]>,
     /// A triangle's side opposite to the vertex that it shares with another triangle, and that other.
     sides: Vec<Side>,
+    /// What the first round of the filter leaves.
+    left: Vec<[u32; 2]>,
+    left_sides: Vec<Side>,
     found: Vec<[u32; 2]>,
 }
 
@@ -59,33 +68,53 @@ struct Side {
     triangle: [u32; 3],
 }
 
+/// Bit per corner of `one`: `other` has it too.
+#[allow(
+    clippy::needless_bitwise_bool,
+    reason = "most pairs are strangers: nine comparisons without a branch"
+)]
+fn common_corners(one: &[u32; 3], other: &[u32; 3]) -> u8 {
+    let bit = |k: usize| u8::from((one[k] == other[0]) | (one[k] == other[1]) | (one[k] == other[2])) << k;
+    bit(0) | bit(1) | bit(2)
+}
+
 /// Pairs wait until there are so many.
 const FLUSH: usize = 1024;
 
 impl Meetings<'_> {
     fn flush(&mut self) {
-        let Self { mesh, x, rows, strangers, sides, found, .. } = self;
+        let Self { mesh, x, rows, strangers, sides, left, left_sides, found, .. } = self;
         let row = |v: u32| &rows[v as usize];
+        let rows_of_pair = |pair: &[u32; 2]| {
+            let (s, t) = (&mesh.triangles[pair[0] as usize], &mesh.triangles[pair[1] as usize]);
+            [row(s[0]), row(s[1]), row(s[2]), row(t[0]), row(t[1]), row(t[2])]
+        };
+        filter(strangers, rows_of_pair, |rows| four_triangles_maybe_apart(rows, 0.0), |pair| left.push(pair));
         filter(
-            strangers,
+            left,
+            rows_of_pair,
+            |rows| four_triangles_beside_planes(rows, 0.0),
             |pair| {
-                let [[a, b, c], [p, q, r]] = pair.map(|t| mesh.triangles[t as usize].map(row));
-                [a, b, c, p, q, r]
-            },
-            |rows| four_triangles_apart(rows, 0.0),
-            |pair| {
-                let [first, second] = pair.map(|t| mesh.triangles[t as usize].map(|v| x[v as usize]));
+                let points = |t: u32| mesh.triangles[t as usize].map(|v| x[v as usize]);
+                let (first, second) = (points(pair[0]), points(pair[1]));
                 if triangles_meet(&first, &second) {
                     found.push(pair);
                 }
             },
         );
+        let rows_of_side = |item: &Side| {
+            let ([p, q], [a, b, c]) = (item.ends, item.triangle);
+            [row(p), row(q), row(a), row(b), row(c)]
+        };
         filter(
             sides,
-            |item| {
-                let ([p, q], [a, b, c]) = (item.ends.map(row), item.triangle.map(row));
-                [p, q, a, b, c]
-            },
+            rows_of_side,
+            |rows| four_segment_triangles_maybe_apart(rows, 0.0),
+            |item| left_sides.push(item),
+        );
+        filter(
+            left_sides,
+            rows_of_side,
             |rows| four_segment_triangles_apart(rows, 0.0),
             |item| {
                 if segment_meets_triangle(
@@ -96,6 +125,8 @@ impl Meetings<'_> {
                 }
             },
         );
+        left.clear();
+        left_sides.clear();
         strangers.clear();
         sides.clear();
     }
@@ -114,21 +145,17 @@ impl Visit for Meetings<'_> {
                 continue;
             }
             let pair = [s.min(t), s.max(t)];
-            let (mut shared, mut corners) = (0, (0, 0));
-            for i in 0..3 {
-                for j in 0..3 {
-                    if first[i] == second[j] {
-                        shared += 1;
-                        corners = (i, j);
-                    }
-                }
-            }
-            match shared {
+            let corners = common_corners(&first, &second);
+            match corners.count_ones() {
                 0 => self.strangers.push(pair),
                 1 => {
-                    let opposite = |tri: [u32; 3], k: usize| [tri[(k + 1) % 3], tri[(k + 2) % 3]];
-                    self.sides.push(Side { pair, ends: opposite(first, corners.0), triangle: second });
-                    self.sides.push(Side { pair, ends: opposite(second, corners.1), triangle: first });
+                    let opposite = |tri: [u32; 3], corners: u8| {
+                        let k = corners.trailing_zeros() as usize;
+                        [tri[(k + 1) % 3], tri[(k + 2) % 3]]
+                    };
+                    self.sides.push(Side { pair, ends: opposite(first, corners), triangle: second });
+                    let corners = common_corners(&second, &first);
+                    self.sides.push(Side { pair, ends: opposite(second, corners), triangle: first });
                 }
                 _ => {}
             }

@@ -42,13 +42,21 @@ pub(super) fn triangles(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Ve
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn features_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Candidates) {
-    features_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2(bounds, block));
+    if boxes.still {
+        features_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2::<true>(bounds, block));
+    } else {
+        features_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2::<false>(bounds, block));
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn triangles_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Vec<[u32; 2]>) {
-    triangles_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2(bounds, block));
+    if boxes.still {
+        triangles_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2::<true>(bounds, block));
+    } else {
+        triangles_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2::<false>(bounds, block));
+    }
 }
 
 #[inline(always)]
@@ -143,10 +151,11 @@ fn overlap_mask(bounds: &MovingBox, block: &Block) -> u32 {
     mask
 }
 
+/// [`overlap_mask`]; a still query has no second end to look at.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
-fn overlap_mask_avx2(bounds: &MovingBox, block: &Block) -> u32 {
+fn overlap_mask_avx2<const STILL: bool>(bounds: &MovingBox, block: &Block) -> u32 {
     use std::arch::x86_64::{
         _CMP_GT_OQ, _CMP_LT_OQ, _mm256_and_ps, _mm256_cmp_ps, _mm256_load_ps, _mm256_movemask_ps,
         _mm256_or_ps, _mm256_set1_ps, _mm256_setzero_ps,
@@ -161,8 +170,12 @@ fn overlap_mask_avx2(bounds: &MovingBox, block: &Block) -> u32 {
         let below = |end: usize| {
             _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_set1_ps(bounds.hi[end][axis]), load(&block.lo[end][axis]))
         };
-        apart = _mm256_or_ps(apart, _mm256_and_ps(above(0), above(1)));
-        apart = _mm256_or_ps(apart, _mm256_and_ps(below(0), below(1)));
+        if STILL {
+            apart = _mm256_or_ps(apart, _mm256_or_ps(above(0), below(0)));
+        } else {
+            apart = _mm256_or_ps(apart, _mm256_and_ps(above(0), above(1)));
+            apart = _mm256_or_ps(apart, _mm256_and_ps(below(0), below(1)));
+        }
     }
     !_mm256_movemask_ps(apart) as u32 & 0xff
 }

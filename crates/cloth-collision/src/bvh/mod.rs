@@ -60,11 +60,27 @@ impl Bvh {
     /// # Errors
     /// [`DetectError::Length`] and [`DetectError::NotFinite`] for `x`.
     pub fn new(mesh: &CollisionMesh, x: &[Vec3]) -> Result<Self, DetectError> {
+        Self::build(mesh, x, None)
+    }
+
+    /// [`Bvh::new`] on a pool: the same tree for any number of threads.
+    ///
+    /// # Errors
+    /// As [`Bvh::new`].
+    pub fn new_in(mesh: &CollisionMesh, x: &[Vec3], pool: &rayon::ThreadPool) -> Result<Self, DetectError> {
+        Self::build(mesh, x, Some(pool))
+    }
+
+    fn build(
+        mesh: &CollisionMesh,
+        x: &[Vec3],
+        pool: Option<&rayon::ThreadPool>,
+    ) -> Result<Self, DetectError> {
         check_positions("x", x, mesh.vertex_count)?;
         Ok(Self {
             vertex_count: mesh.vertex_count,
             triangle_count: mesh.triangles.len(),
-            tree: build::build(mesh, x),
+            tree: build::build(mesh, x, pool),
             boxes: Boxes::default(),
         })
     }

@@ -40,7 +40,8 @@ impl<'a> Scene<'a> {
 
     #[inline]
     fn rows(&self, vertices: [u32; 4]) -> [&Row; 8] {
-        let [a, b, c, d] = vertices.map(|v| &self.motion[v as usize].0);
+        let motion = |k: usize| &self.motion[vertices[k] as usize].0;
+        let (a, b, c, d) = (motion(0), motion(1), motion(2), motion(3));
         [&a[0], &b[0], &c[0], &d[0], &a[1], &b[1], &c[1], &d[1]]
     }
 

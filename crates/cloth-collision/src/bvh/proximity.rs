@@ -102,7 +102,8 @@ impl Sink for Near<'_> {
     fn take(&mut self, candidates: &mut Candidates) {
         let (mesh, x, thickness) = (self.mesh, self.query.x_t1, self.query.thickness);
         let mut waiting = std::mem::take(&mut self.waiting);
-        let rows = |pair: &Pair| pair.1.map(|v| &self.rows[v as usize]);
+        let row = |v: u32| &self.rows[v as usize];
+        let rows = |pair: &Pair| [row(pair.1[0]), row(pair.1[1]), row(pair.1[2]), row(pair.1[3])];
 
         waiting.clear();
         for [v, t] in candidates.vertex_triangle.drain(..) {

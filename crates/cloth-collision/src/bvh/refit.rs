@@ -9,6 +9,8 @@ use rayon::prelude::*;
 /// The boxes of one call.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Boxes {
+    /// Both ends are equal.
+    pub(super) still: bool,
     pub(super) vertices: Vec<MovingBox>,
     pub(super) nodes: Vec<MovingBox>,
     /// Whether a vertex of the subtree's triangles is active.
@@ -23,7 +25,7 @@ const VERTEX_CHUNK: usize = 4096;
 const BLOCK_CHUNK: usize = 256;
 
 impl Boxes {
-    /// Fits all boxes to the motion from `x_t0` to `x_t1` \[m\], inflated by `margin` \[m\].
+    /// Fits all boxes to the motion from `x_t0` to `x_t1` \[m\] (the same slice: at rest), inflated by `margin` \[m\].
     pub(super) fn refit(
         &mut self,
         tree: &Tree,
@@ -35,6 +37,8 @@ impl Boxes {
         pool: &rayon::ThreadPool,
     ) {
         let origin = middle(x_t0);
+        let still = std::ptr::eq(x_t0, x_t1);
+        self.still = still;
         self.vertices.resize(mesh.vertex_count, MovingBox::EMPTY);
         self.triangle_blocks.resize(tree.triangle_ids.len(), Block::EMPTY);
         self.vertex_blocks.resize(tree.vertex_ids.len(), Block::EMPTY);
@@ -48,7 +52,11 @@ impl Boxes {
             vertices.par_chunks_mut(VERTEX_CHUNK).enumerate().for_each(|(chunk, boxes)| {
                 for (k, b) in boxes.iter_mut().enumerate() {
                     let v = chunk * VERTEX_CHUNK + k;
-                    *b = MovingBox::of_vertex(&x_t0[v], &x_t1[v], &origin, margin);
+                    *b = if still {
+                        MovingBox::of_still_vertex(&x_t0[v], &origin, margin)
+                    } else {
+                        MovingBox::of_vertex(&x_t0[v], &x_t1[v], &origin, margin)
+                    };
                 }
             });
             let vertices = &*vertices;
@@ -74,11 +82,11 @@ impl Boxes {
                     is_active |= self.node_active[child];
                 }
             } else {
-                for &t in tree.triangle_ids[shape.leaf as usize].iter().filter(|&&t| t != NONE) {
-                    for &v in &mesh.triangles[t as usize] {
-                        bounds.grow(&self.vertices[v as usize]);
-                        is_active |= active.is_some_and(|mask| mask[v as usize]);
-                    }
+                bounds = self.triangle_blocks[shape.leaf as usize].hull();
+                if let Some(mask) = active {
+                    let triangles = tree.triangle_ids[shape.leaf as usize].iter().filter(|&&t| t != NONE);
+                    is_active =
+                        triangles.flat_map(|&t| &mesh.triangles[t as usize]).any(|&v| mask[v as usize]);
                 }
             }
             self.nodes[node] = bounds;

@@ -15,7 +15,7 @@ const FEW: usize = 2;
 /// Directions that are tried with what is left then: more cost more than the exact searches that they save.
 const MANY: usize = 8;
 
-/// Directions for pairs at rest.
+/// Directions for features at rest.
 const AT_REST: usize = 5;
 
 /// Eight points (four at t0, the same four at t1) of as many pairs as there are lanes.
@@ -168,14 +168,55 @@ fn edge_edge_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
 /// Where a segment (first two points) certainly has no point in common with a triangle (last three).
 #[inline(always)]
 fn segment_triangle_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
-    let d = [p[0] - p[2], p[0] - p[3], p[0] - p[4], p[1] - p[2], p[1] - p[3], p[1] - p[4]];
-    separated::<L, 6, AT_REST>(&d, 0.0)
+    segment_triangle::<L, MANY>(p)
 }
 
-/// Where two triangles (three points each) certainly have no point in common.
+/// [`segment_triangle_apart`] with less effort.
 #[inline(always)]
-fn triangle_triangle_apart<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
-    let d = [
+fn segment_triangle_maybe_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
+    segment_triangle::<L, FEW>(p)
+}
+
+#[inline(always)]
+fn segment_triangle<L: Lanes, const STEPS: usize>(p: &[Vector<L>; 5]) -> L::Mask {
+    let d = [p[0] - p[2], p[0] - p[3], p[0] - p[4], p[1] - p[2], p[1] - p[3], p[1] - p[4]];
+    separated::<L, 6, STEPS>(&d, 0.0)
+}
+
+/// Where two triangles (three points each) certainly have no point in common, by Gilbert's directions.
+#[inline(always)]
+fn triangle_triangle_maybe_apart<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
+    separated::<L, 9, FEW>(&between_triangles(p), 0.0)
+}
+
+/// Where the plane of one of two triangles certainly separates them.
+#[inline(always)]
+fn triangles_beside_planes<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
+    let d = between_triangles(p);
+    let normals = [(p[1] - p[0]).cross(p[2] - p[0]), (p[4] - p[3]).cross(p[5] - p[3])];
+    let mut extent = d[0].largest();
+    for k in 1..9 {
+        extent = extent.max(d[k].largest());
+    }
+    let zero = L::splat(0.0);
+    let mut apart = zero.greater(zero);
+    for n in normals {
+        let (mut lowest, mut highest) = (n.dot(d[0]), n.dot(d[0]));
+        for k in 1..9 {
+            let g = n.dot(d[k]);
+            lowest = lowest.min(g);
+            highest = highest.max(g);
+        }
+        // As in `separated`: any direction may separate, the normal's own rounding does not matter.
+        let bound = n.sum_of_sizes() * extent * L::splat(ROUNDING) + L::splat(f64::MIN_POSITIVE);
+        apart = apart | lowest.greater(bound) | (zero - bound).greater(highest);
+    }
+    apart
+}
+
+#[inline(always)]
+fn between_triangles<L: Lanes>(p: &[Vector<L>; 6]) -> [Vector<L>; 9] {
+    [
         p[0] - p[3],
         p[0] - p[4],
         p[0] - p[5],
@@ -185,8 +226,7 @@ fn triangle_triangle_apart<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
         p[2] - p[3],
         p[2] - p[4],
         p[2] - p[5],
-    ];
-    separated::<L, 9, AT_REST>(&d, 0.0)
+    ]
 }
 
 /// A point with a fourth entry of no meaning, so that it fills a register.
@@ -241,8 +281,15 @@ four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, ver
 four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart, 8);
 four_at_once!(four_vertex_triangles_beyond, four_vertex_triangles_beyond_avx2, vertex_triangle_beyond, 4);
 four_at_once!(four_edge_edges_beyond, four_edge_edges_beyond_avx2, edge_edge_beyond, 4);
+four_at_once!(
+    four_segment_triangles_maybe_apart,
+    four_segment_triangles_maybe_apart_avx2,
+    segment_triangle_maybe_apart,
+    5
+);
+four_at_once!(four_triangles_maybe_apart, four_triangles_maybe_apart_avx2, triangle_triangle_maybe_apart, 6);
 four_at_once!(four_segment_triangles_apart, four_segment_triangles_apart_avx2, segment_triangle_apart, 5);
-four_at_once!(four_triangles_apart, four_triangles_apart_avx2, triangle_triangle_apart, 6);
+four_at_once!(four_triangles_beside_planes, four_triangles_beside_planes_avx2, triangles_beside_planes, 6);
 
 /// Calls `survivor` with each item that the filter does not reject: `points` names an item's rows, `apart` answers for
 /// four items.
