@@ -51,8 +51,8 @@ compare: build ## Detection side by side with IPC Toolkit, in one run (installs 
 	$(BIN)/pip install --quiet "ipctk==1.6.1"
 	$(BIN)/python benches/compare_ipctk.py
 
-schema: build ## Print the JSON schema of scene files
-	$(BIN)/clothsim schema
+schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
+	$(BIN)/clothsim schema > docs/scene.schema.json
 
 clean: ## Remove what the targets above made
 	rm -rf target $(VENV) out

@@ -77,3 +77,18 @@ def test_every_error_has_its_place_in_the_tree() -> None:
     for name, bases in tree.items():
         assert getattr(cs.errors, name).__bases__ == bases
         assert getattr(cs, name) is getattr(cs.errors, name)
+
+
+def test_the_published_schema_is_the_present_one() -> None:
+    schema = subprocess.run(
+        [sys.executable, "-m", "clothsim", "schema"], capture_output=True, text=True, check=True
+    ).stdout
+    assert (ROOT / "docs" / "scene.schema.json").read_text() == schema, "run `make schema`"
+
+
+def test_the_example_in_the_readme_runs(tmp_path: Path) -> None:
+    text = (ROOT / "README.md").read_text()
+    code = text.split("```python\n")[1].split("```")[0]
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "lowest point" in done.stdout
