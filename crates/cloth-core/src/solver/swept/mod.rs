@@ -289,23 +289,23 @@ impl Swept {
         });
     }
 
-    /// x += α t, r̂ −= α (s + t) (not at the start), the restriction (Tᵀ W)ᵀ r̂ if there is a coarse space; returns r̂·r̂.
+    /// x += α t, r̂ −= α (s + t) (α = 0 at the start), the restriction (Tᵀ W)ᵀ r̂ if there is a coarse space; returns r̂·r̂.
     fn advance(&mut self, alpha: f64, corrected: bool) -> f64 {
         let Self { rows, coarse, r, t, s, x, partial, .. } = self;
         let (t, s, shared) = (&*t, &*s, &*coarse);
         for_domains(&rows.domains, (r.as_mut_slice(), x.as_mut_slice()), partial, &|d, (r, x), partial| {
             let first = rows.domains[d];
-            partial.dot = 0.0;
-            for i in 0..r.len() {
-                let (t, s) = (&t[first + i].0, &s[first + i].0);
-                if alpha != 0.0 {
-                    for l in 0..4 {
-                        x[i].0[l] += alpha * t[l];
-                        r[i].0[l] -= alpha * (s[l] + t[l]);
-                    }
+            // Lane by lane, so that no sum waits for the one before it in its row.
+            let mut squares = [0.0; 4];
+            let (t, s) = (&t[first..first + r.len()], &s[first..first + r.len()]);
+            for ((r, x), (t, s)) in r.iter_mut().zip(x.iter_mut()).zip(t.iter().zip(s)) {
+                for l in 0..4 {
+                    x.0[l] += alpha * t.0[l];
+                    r.0[l] -= alpha * (s.0[l] + t.0[l]);
+                    squares[l] += r.0[l] * r.0[l];
                 }
-                partial.dot += r[i].dot(&r[i]);
             }
+            partial.dot = squares[0] + squares[1] + squares[2];
             if corrected {
                 partial.coarse.fill([Lanes::ZERO; 3]);
                 kernels::restrict(shared, rows, d, r, &mut partial.coarse);
