@@ -74,7 +74,9 @@ fn sheets_far_from_the_origin_agree() {
     for (seed, offset) in [(1, 0.0), (2, 1e3), (3, -1e6)] {
         let mut random = Random(seed);
         let (mut x_t0, triangles) = sheet(10, &mut random);
-        x_t0.iter_mut().for_each(|x| *x += Vec3::repeat(offset));
+        for x in &mut x_t0 {
+            *x += Vec3::repeat(offset);
+        }
         let x_t1: Vec<Vec3> = x_t0.iter().map(|x| x + random.vector(0.15)).collect();
         let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
         let found = compare_all(&mesh, &x_t0, &x_t1, &mut random, &format!("sheet at {offset}"));

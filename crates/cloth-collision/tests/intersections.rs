@@ -123,11 +123,38 @@ fn random_scenes_agree_with_every_pair() {
 }
 
 #[test]
+fn crumpled_sheets_agree_with_every_pair() {
+    let mut total = 0;
+    for seed in 0..12 {
+        let mut random = Random(50 + seed);
+        let (mut x, triangles) = sheet(12, &mut random);
+        let half = [0.05, 0.1, 0.2][seed as usize % 3];
+        for p in &mut x {
+            *p += random.vector(half);
+        }
+        let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
+        let expected = by_every_pair(&mesh, &x);
+        assert_eq!(self_intersections(&triangles, &x, &pool(1)).unwrap(), expected);
+        // Neighbours at one vertex among them: the fans that fold over.
+        total += expected
+            .iter()
+            .filter(|p| {
+                let [s, t] = p.map(|t| triangles[t as usize]);
+                s.iter().any(|v| t.contains(v))
+            })
+            .count();
+    }
+    assert!(total > 100, "neighbours must meet, found {total}");
+}
+
+#[test]
 fn a_flat_sheet_does_not_meet_itself() {
     let mut random = Random(1);
     for offset in [0.0, 1e5] {
         let (mut x, triangles) = sheet(40, &mut random);
-        x.iter_mut().for_each(|p| *p = Vec3::new(p.x + offset, 1.0, p.z + offset));
+        for p in &mut x {
+            *p = Vec3::new(p.x + offset, 1.0, p.z + offset);
+        }
         assert!(self_intersections(&triangles, &x, &pool(1)).unwrap().is_empty());
     }
 }

@@ -29,7 +29,7 @@ fn check(stencil: &Stencil, x: &[Vec3], thickness: f64) {
     );
     match stencil.kind {
         StencilKind::VertexTriangle => {
-            assert!(w[0] == 1.0 && w[1..].iter().all(|&w| (-1.0..=0.0).contains(&w)))
+            assert!(w[0] == 1.0 && w[1..].iter().all(|&w| (-1.0..=0.0).contains(&w)));
         }
         StencilKind::EdgeEdge => assert!(w[0] >= 0.0 && w[1] >= 0.0 && w[2] <= 0.0 && w[3] <= 0.0),
     }
@@ -130,7 +130,9 @@ fn two_layers_are_seen_in_all_regions() {
     // A grid over itself, shifted: vertices over faces, over sides and over vertices; sides across sides.
     let mut random = Random(2);
     let (mut x, triangles) = sheet(6, &mut random);
-    x.iter_mut().for_each(|p| p.y = 0.0);
+    for p in &mut x {
+        p.y = 0.0;
+    }
     for shift in [[0.0, 0.0], [0.1, 0.0], [0.05, 0.03]] {
         let second: Vec<Vec3> = x.iter().map(|p| p + Vec3::new(shift[0], 0.01, shift[1])).collect();
         let both: Vec<Vec3> = x.iter().chain(&second).copied().collect();

@@ -13,6 +13,8 @@ pub(super) struct Tree {
     pub(super) leaves: Vec<Leaf>,
     /// Triangles of each leaf, [`NONE`] in unused lanes; block = leaf.
     pub(super) triangle_ids: Vec<[u32; LANES]>,
+    /// Their vertices, side by side where they are looked at together.
+    pub(super) corners: Vec<[[u32; 3]; LANES]>,
     /// Vertices owned by the triangles of a leaf, in blocks.
     pub(super) vertex_ids: Vec<[u32; LANES]>,
     /// Edges owned by the triangles of a leaf, in blocks.
@@ -131,10 +133,12 @@ fn push_subtree(mesh: &CollisionMesh, body: u32, items: &mut [Item], tree: &mut 
 fn push_leaf(mesh: &CollisionMesh, node: u32, items: &mut [Item], tree: &mut Tree) {
     items.sort_unstable_by_key(|i| i.triangle);
     let mut triangles = [NONE; LANES];
+    let mut corners = [[NONE; 3]; LANES];
     let (mut vertices, mut edges) = (Vec::new(), Vec::new());
     for (lane, item) in items.iter().enumerate() {
         let t = item.triangle;
         triangles[lane] = t;
+        corners[lane] = mesh.triangles[t as usize];
         // A mesh without features has no owners: its leaves hold triangles only.
         let Some(sides) = mesh.triangle_edges.get(t as usize) else { continue };
         for k in 0..3 {
@@ -151,6 +155,7 @@ fn push_leaf(mesh: &CollisionMesh, node: u32, items: &mut [Item], tree: &mut Tre
     push_blocks(&vertices, &mut tree.vertex_ids);
     push_blocks(&edges, &mut tree.edge_ids);
     tree.triangle_ids.push(triangles);
+    tree.corners.push(corners);
     tree.leaves.push(Leaf {
         node,
         vertex_blocks: [first_vertex_block, tree.vertex_ids.len() as u32],

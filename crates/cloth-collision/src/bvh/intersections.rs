@@ -1,7 +1,7 @@
 //! Pairs of triangles that pass through each other, by the tree.
 
 use super::traverse::{LeafPairs, Visit};
-use super::{Bvh, leaf_pair};
+use super::{Bvh, leaf_pair, leaf_pair::TrianglePair};
 use crate::ccd::filter::{
     Row, filter, four_segment_triangles_apart, four_segment_triangles_maybe_apart,
     four_triangles_beside_planes, four_triangles_maybe_apart, row,
@@ -50,13 +50,13 @@ struct Meetings<'a> {
     mesh: &'a CollisionMesh,
     x: &'a [Vec3],
     rows: &'a [Row],
-    waiting: Vec<[u32; 2]>,
+    waiting: Vec<TrianglePair>,
     /// Pairs of triangles without a common vertex.
-    strangers: Vec<[u32; 2]>,
+    strangers: Vec<TrianglePair>,
     /// A triangle's side opposite to the vertex that it shares with another triangle, and that other.
     sides: Vec<Side>,
     /// What the first round of the filter leaves.
-    left: Vec<[u32; 2]>,
+    left: Vec<TrianglePair>,
     left_sides: Vec<Side>,
     found: Vec<[u32; 2]>,
 }
@@ -78,15 +78,19 @@ fn common_corners(one: &[u32; 3], other: &[u32; 3]) -> u8 {
     bit(0) | bit(1) | bit(2)
 }
 
+fn sorted([s, t]: [u32; 2]) -> [u32; 2] {
+    [s.min(t), s.max(t)]
+}
+
 /// Pairs wait until there are so many.
 const FLUSH: usize = 1024;
 
 impl Meetings<'_> {
     fn flush(&mut self) {
-        let Self { mesh, x, rows, strangers, sides, left, left_sides, found, .. } = self;
+        let Self { x, rows, strangers, sides, left, left_sides, found, .. } = self;
         let row = |v: u32| &rows[v as usize];
-        let rows_of_pair = |pair: &[u32; 2]| {
-            let (s, t) = (&mesh.triangles[pair[0] as usize], &mesh.triangles[pair[1] as usize]);
+        let rows_of_pair = |pair: &TrianglePair| {
+            let (s, t) = (&pair.first, &pair.second);
             [row(s[0]), row(s[1]), row(s[2]), row(t[0]), row(t[1]), row(t[2])]
         };
         filter(strangers, rows_of_pair, |rows| four_triangles_maybe_apart(rows, 0.0), |pair| left.push(pair));
@@ -95,10 +99,9 @@ impl Meetings<'_> {
             rows_of_pair,
             |rows| four_triangles_beside_planes(rows, 0.0),
             |pair| {
-                let points = |t: u32| mesh.triangles[t as usize].map(|v| x[v as usize]);
-                let (first, second) = (points(pair[0]), points(pair[1]));
-                if triangles_meet(&first, &second) {
-                    found.push(pair);
+                let points = |t: &[u32; 3]| [x[t[0] as usize], x[t[1] as usize], x[t[2] as usize]];
+                if triangles_meet(&points(&pair.first), &points(&pair.second)) {
+                    found.push(sorted(pair.triangles));
                 }
             },
         );
@@ -135,20 +138,17 @@ impl Meetings<'_> {
 impl Visit for Meetings<'_> {
     fn leaf_pair(&mut self, leaves: &LeafPairs<'_>, a: u32, b: u32) {
         leaf_pair::triangles(leaves.tree, leaves.boxes, a, b, &mut self.waiting);
-        for [s, t] in self.waiting.drain(..) {
+        for pair in self.waiting.drain(..) {
+            let TrianglePair { triangles, first, second } = pair;
             // The traversal has seen to the bodies.
-            if s == NONE || t == NONE {
+            if triangles.contains(&NONE) || self.mesh.is_attached(&first, &second) {
                 continue;
             }
-            let (first, second) = (self.mesh.triangles[s as usize], self.mesh.triangles[t as usize]);
-            if self.mesh.is_attached(&first, &second) {
-                continue;
-            }
-            let pair = [s.min(t), s.max(t)];
             let corners = common_corners(&first, &second);
             match corners.count_ones() {
                 0 => self.strangers.push(pair),
                 1 => {
+                    let pair = sorted(triangles);
                     let opposite = |tri: [u32; 3], corners: u8| {
                         let k = corners.trailing_zeros() as usize;
                         [tri[(k + 1) % 3], tri[(k + 2) % 3]]

@@ -13,6 +13,14 @@ pub(super) struct Candidates {
     pub(super) edge_edge: Vec<[u32; 2]>,
 }
 
+/// Two triangles whose boxes overlap, with their vertices.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TrianglePair {
+    pub(super) triangles: [u32; 2],
+    pub(super) first: [u32; 3],
+    pub(super) second: [u32; 3],
+}
+
 /// Pairs of features of the leaves `a` and `b` (once each if they are equal) whose boxes overlap. Pairs that share a
 /// vertex are among them, and pairs with an unused lane ([`cloth_mesh::NONE`]) where boxes reach to infinity.
 #[inline]
@@ -29,7 +37,7 @@ pub(super) fn features(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Can
 /// Pairs of triangles of the leaves `a` and `b` (once each if they are equal) whose boxes overlap, as in
 /// [`features`].
 #[inline]
-pub(super) fn triangles(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Vec<[u32; 2]>) {
+pub(super) fn triangles(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Vec<TrianglePair>) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
@@ -51,7 +59,7 @@ fn features_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Candidate
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn triangles_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Vec<[u32; 2]>) {
+fn triangles_avx2(tree: &Tree, boxes: &Boxes, a: u32, b: u32, out: &mut Vec<TrianglePair>) {
     if boxes.still {
         triangles_with(tree, boxes, a, b, out, |bounds, block| overlap_mask_avx2::<true>(bounds, block));
     } else {
@@ -65,18 +73,24 @@ fn triangles_with(
     boxes: &Boxes,
     a: u32,
     b: u32,
-    out: &mut Vec<[u32; 2]>,
+    out: &mut Vec<TrianglePair>,
     overlap: impl Fn(&MovingBox, &Block) -> u32 + Copy,
 ) {
     let box_b = &boxes.nodes[tree.leaves[b as usize].node as usize];
     let (blocks_a, blocks_b) = (&boxes.triangle_blocks[a as usize], &boxes.triangle_blocks[b as usize]);
+    let (ids_a, ids_b) = (&tree.triangle_ids[a as usize], &tree.triangle_ids[b as usize]);
+    let (corners_a, corners_b) = (&tree.corners[a as usize], &tree.corners[b as usize]);
     for lane in lanes(overlap(box_b, blocks_a)) {
         let mut hits = overlap(&blocks_a.get(lane), blocks_b);
         if a == b {
             hits &= !0 << (lane + 1);
         }
         for hit in lanes(hits) {
-            out.push([tree.triangle_ids[a as usize][lane], tree.triangle_ids[b as usize][hit]]);
+            out.push(TrianglePair {
+                triangles: [ids_a[lane], ids_b[hit]],
+                first: corners_a[lane],
+                second: corners_b[hit],
+            });
         }
     }
 }
