@@ -3,8 +3,7 @@
 use super::traverse::{LeafPairs, Visit};
 use super::{Bvh, leaf_pair, leaf_pair::TrianglePair};
 use crate::ccd::filter::{
-    Row, filter, four_segment_triangles_apart, four_segment_triangles_maybe_apart,
-    four_triangles_beside_planes, four_triangles_maybe_apart, row,
+    Row, filter, four_joined_triangles_apart, four_triangles_beside_planes, four_triangles_maybe_apart, row,
 };
 use crate::intersect::{segment_meets_triangle, triangles_meet};
 use crate::{CollisionMesh, DetectError, Mode, Query, Vec3};
@@ -33,15 +32,12 @@ impl Bvh {
             rows: &rows,
             waiting: vec![],
             strangers: vec![],
-            sides: vec![],
+            joined: vec![],
             left: vec![],
-            left_sides: vec![],
             found: vec![],
         });
         let mut found: Vec<[u32; 2]> = visits.into_iter().flat_map(|v| v.found).collect();
-        // Both sides of a pair with a common vertex may have met.
         pool.install(|| found.par_sort_unstable());
-        found.dedup();
         Ok(found)
     }
 }
@@ -53,19 +49,20 @@ struct Meetings<'a> {
     waiting: Vec<TrianglePair>,
     /// Pairs of triangles without a common vertex.
     strangers: Vec<TrianglePair>,
-    /// A triangle's side opposite to the vertex that it shares with another triangle, and that other.
-    sides: Vec<Side>,
+    /// Pairs of triangles with one common vertex.
+    joined: Vec<Joined>,
     /// What the first round of the filter leaves.
     left: Vec<TrianglePair>,
-    left_sides: Vec<Side>,
     found: Vec<[u32; 2]>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Side {
+struct Joined {
     pair: [u32; 2],
-    ends: [u32; 2],
-    triangle: [u32; 3],
+    common: u32,
+    /// The other corners.
+    first: [u32; 2],
+    second: [u32; 2],
 }
 
 /// Bit per corner of `one`: `other` has it too.
@@ -87,7 +84,7 @@ const FLUSH: usize = 1024;
 
 impl Meetings<'_> {
     fn flush(&mut self) {
-        let Self { x, rows, strangers, sides, left, left_sides, found, .. } = self;
+        let Self { x, rows, strangers, joined, left, found, .. } = self;
         let row = |v: u32| &rows[v as usize];
         let rows_of_pair = |pair: &TrianglePair| {
             let (s, t) = (&pair.first, &pair.second);
@@ -105,33 +102,28 @@ impl Meetings<'_> {
                 }
             },
         );
-        let rows_of_side = |item: &Side| {
-            let ([p, q], [a, b, c]) = (item.ends, item.triangle);
-            [row(p), row(q), row(a), row(b), row(c)]
+        let rows_of_joined = |pair: &Joined| {
+            let ([a, b], [p, q]) = (pair.first, pair.second);
+            [row(pair.common), row(a), row(b), row(p), row(q)]
         };
         filter(
-            sides,
-            rows_of_side,
-            |rows| four_segment_triangles_maybe_apart(rows, 0.0),
-            |item| left_sides.push(item),
-        );
-        filter(
-            left_sides,
-            rows_of_side,
-            |rows| four_segment_triangles_apart(rows, 0.0),
-            |item| {
-                if segment_meets_triangle(
-                    &item.ends.map(|v| x[v as usize]),
-                    &item.triangle.map(|v| x[v as usize]),
-                ) {
-                    found.push(item.pair);
+            joined,
+            rows_of_joined,
+            |rows| four_joined_triangles_apart(rows, 0.0),
+            |pair| {
+                let point = |v: u32| x[v as usize];
+                let common = point(pair.common);
+                let (a, b) = (pair.first.map(point), pair.second.map(point));
+                if segment_meets_triangle(&a, &[common, b[0], b[1]])
+                    || segment_meets_triangle(&b, &[common, a[0], a[1]])
+                {
+                    found.push(pair.pair);
                 }
             },
         );
         left.clear();
-        left_sides.clear();
+        joined.clear();
         strangers.clear();
-        sides.clear();
     }
 }
 
@@ -148,19 +140,20 @@ impl Visit for Meetings<'_> {
             match corners.count_ones() {
                 0 => self.strangers.push(pair),
                 1 => {
-                    let pair = sorted(triangles);
-                    let opposite = |tri: [u32; 3], corners: u8| {
-                        let k = corners.trailing_zeros() as usize;
-                        [tri[(k + 1) % 3], tri[(k + 2) % 3]]
-                    };
-                    self.sides.push(Side { pair, ends: opposite(first, corners), triangle: second });
-                    let corners = common_corners(&second, &first);
-                    self.sides.push(Side { pair, ends: opposite(second, corners), triangle: first });
+                    let others =
+                        |tri: [u32; 3], k: u32| [tri[(k as usize + 1) % 3], tri[(k as usize + 2) % 3]];
+                    let (k, j) = (corners.trailing_zeros(), common_corners(&second, &first).trailing_zeros());
+                    self.joined.push(Joined {
+                        pair: sorted(triangles),
+                        common: first[k as usize],
+                        first: others(first, k),
+                        second: others(second, j),
+                    });
                 }
                 _ => {}
             }
         }
-        if self.strangers.len() + self.sides.len() > FLUSH {
+        if self.strangers.len() + self.joined.len() > FLUSH {
             self.flush();
         }
     }

@@ -16,7 +16,7 @@ const FEW: usize = 2;
 const MANY: usize = 8;
 
 /// Directions for features at rest.
-const AT_REST: usize = 5;
+const AT_REST: usize = 3;
 
 /// Eight points (four at t0, the same four at t1) of as many pairs as there are lanes.
 pub(crate) type Points<L> = [Vector<L>; 8];
@@ -165,22 +165,11 @@ fn edge_edge_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
     separated::<L, 4, AT_REST>(&[p[0] - p[2], p[0] - p[3], p[1] - p[2], p[1] - p[3]], thickness)
 }
 
-/// Where a segment (first two points) certainly has no point in common with a triangle (last three).
+/// Where a plane through the common vertex (first point) of two triangles certainly has the other corners of one (next
+/// two) on one side of it and those of the other (last two) on the other side: they meet at that vertex only.
 #[inline(always)]
-fn segment_triangle_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
-    segment_triangle::<L, MANY>(p)
-}
-
-/// [`segment_triangle_apart`] with less effort.
-#[inline(always)]
-fn segment_triangle_maybe_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
-    segment_triangle::<L, FEW>(p)
-}
-
-#[inline(always)]
-fn segment_triangle<L: Lanes, const STEPS: usize>(p: &[Vector<L>; 5]) -> L::Mask {
-    let d = [p[0] - p[2], p[0] - p[3], p[0] - p[4], p[1] - p[2], p[1] - p[3], p[1] - p[4]];
-    separated::<L, 6, STEPS>(&d, 0.0)
+fn joined_triangles_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
+    separated::<L, 4, AT_REST>(&[p[1] - p[0], p[2] - p[0], p[0] - p[3], p[0] - p[4]], 0.0)
 }
 
 /// Where two triangles (three points each) certainly have no point in common, by Gilbert's directions.
@@ -281,14 +270,8 @@ four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, ver
 four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart, 8);
 four_at_once!(four_vertex_triangles_beyond, four_vertex_triangles_beyond_avx2, vertex_triangle_beyond, 4);
 four_at_once!(four_edge_edges_beyond, four_edge_edges_beyond_avx2, edge_edge_beyond, 4);
-four_at_once!(
-    four_segment_triangles_maybe_apart,
-    four_segment_triangles_maybe_apart_avx2,
-    segment_triangle_maybe_apart,
-    5
-);
 four_at_once!(four_triangles_maybe_apart, four_triangles_maybe_apart_avx2, triangle_triangle_maybe_apart, 6);
-four_at_once!(four_segment_triangles_apart, four_segment_triangles_apart_avx2, segment_triangle_apart, 5);
+four_at_once!(four_joined_triangles_apart, four_joined_triangles_apart_avx2, joined_triangles_apart, 5);
 four_at_once!(four_triangles_beside_planes, four_triangles_beside_planes_avx2, triangles_beside_planes, 6);
 
 /// Calls `survivor` with each item that the filter does not reject: `points` names an item's rows, `apart` answers for
