@@ -16,12 +16,14 @@ pub mod material;
 mod solver;
 
 mod assembly;
+mod effect;
 mod energy;
 mod environment;
 mod error;
 mod integrator;
 mod system;
 
+pub use effect::EffectInfo;
 pub use energy::Energy;
 pub use environment::Environment;
 pub use error::{CoreError, StepError};
@@ -29,4 +31,4 @@ pub use forces::Psd;
 pub use integrator::{Integrator, IntegratorParams, Method, Pins, StepInfo};
 pub use material::{Bending, InPlane, Material};
 pub use solver::{SolveError, SolveInfo, SolverMethod, SolverParams};
-pub use system::{ClothPart, ClothSystem, EffectInfo};
+pub use system::{ClothPart, ClothSystem};

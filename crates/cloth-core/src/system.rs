@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::{
-    Bending, CoreError, Energy, Environment, InPlane, Material,
+    Bending, CoreError, EffectInfo, Energy, Environment, InPlane, Material,
     assembly::{Corners, ELEMENTS_PER_CHUNK, ROWS_PER_CHUNK},
     forces::{
         ForceModel,
@@ -28,17 +28,6 @@ pub struct ClothPart<'a> {
     pub material: &'a Material,
     /// Global index of its vertex 0.
     pub first_vertex: usize,
-}
-
-/// An effect that is built: how much of it there is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct EffectInfo {
-    /// Name of the effect.
-    pub name: &'static str,
-    /// Number of elements: edges, triangles, hinges or vertices.
-    pub elements: usize,
-    /// Memory of its per-element data [B].
-    pub bytes: usize,
 }
 
 /// The force models of all parts over one global vertex array.

@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use super::{CouplingKind, Couplings, ForceModel, Linear, Psd};
-use crate::{Energy, mesh::Vec3, system::EffectInfo};
+use crate::{EffectInfo, Energy, mesh::Vec3};
 
 /// Drag and lift on the triangles of all cloth.
 pub(crate) struct Air {

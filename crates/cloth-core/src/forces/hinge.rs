@@ -22,7 +22,7 @@
 use std::ops::Range;
 
 use super::{CouplingKind, Couplings, ForceModel, Linear, Psd, corner_pairs};
-use crate::{CoreError, Energy, mesh::Vec3, system::EffectInfo};
+use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
 
 /// Area relative to rest under which a triangle's normal no longer gives a full gradient.
 const COLLAPSED: f64 = 1e-4;

@@ -23,7 +23,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::{Energy, mesh::Vec3, system::EffectInfo};
+use crate::{EffectInfo, Energy, mesh::Vec3};
 
 /// What is done about the indefinite part of Hessian blocks.
 ///

@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd};
-use crate::{CoreError, Energy, mesh::Vec3, system::EffectInfo};
+use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
 
 /// Length relative to the rest length under which a spring has no direction.
 const COLLAPSED: f64 = 1e-9;

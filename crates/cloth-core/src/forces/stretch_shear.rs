@@ -19,7 +19,7 @@
 use std::ops::Range;
 
 use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd};
-use crate::{CoreError, Energy, mesh::Vec3, system::EffectInfo};
+use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
 
 /// Length of w under which it has no direction.
 const COLLAPSED: f64 = 1e-9;
