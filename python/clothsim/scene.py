@@ -111,6 +111,10 @@ class Scene:
             "time": time, "solver": solver, "air": air, "contact": contact, "output": output,
         }  # fmt: skip
         self._data: dict[str, Any] = plain(tables, "")
+        for key, tables_of in (("cloth", cloth), ("collider", collider)):
+            if isinstance(tables_of, (str, Mapping)) or not all(isinstance(table, Mapping) for table in tables_of):
+                expected = "a list of tables"
+                raise InvalidScene(f"{key}: expected {expected}, got {tables_of!r}", key=key, expected=expected)
         self._data["cloth"] = [self._cloth_table(table, f"cloth[{i}]") for i, table in enumerate(cloth)]
         self._data["collider"] = [self._collider_table(table, f"collider[{i}]") for i, table in enumerate(collider)]
         if cloth:
@@ -295,24 +299,25 @@ class Scene:
         """
         where = Path(path)
         data = self.to_dict()
-        stem = where.stem
+        stems = iter(_file_stems(where.stem, [body["name"] for body in (*data["cloth"], *data["collider"])]))
         here = self.folder is not None and self.folder.resolve() == where.parent.resolve()
         for body in (*data["cloth"], *data["collider"]):
             mesh = body.get("mesh") or {}
+            stem = next(stems)
             name = mesh.get("asset", mesh.get("file"))
             if name is not None and not (here and "file" in mesh):
-                body["mesh"] = {"file": _save_mesh(self._meshes[name], where, f"{stem}_{file_stem(body['name'])}")}
+                body["mesh"] = {"file": _save_mesh(self._meshes[name], where, stem)}
             sequence = body.get("sequence") or {}
             name = sequence.get("asset") or sequence.get("file")
             if name is not None and not (here and sequence.get("file")):
-                file = f"{stem}_{file_stem(body['name'])}.npz"
+                file = f"{stem}.npz"
                 positions, triangles = self._sequences[name]
                 write_whole(where.with_name(file), _npz(positions=positions, triangles=triangles))
                 kept = {k: v for k, v in sequence.items() if k not in ("asset", "file")}
                 body["sequence"] = {"file": file, **kept}
             name = body.get("velocities")
             if name is not None and not (here and name.endswith(".npy")):
-                file = f"{stem}_{file_stem(body['name'])}_velocities.npy"
+                file = f"{stem}_velocities.npy"
                 write_whole(where.with_name(file), _npy(self._velocities[name]))
                 body["velocities"] = file
         write_whole(where, _core.Scene.from_json(json.dumps(data)).to_toml().encode())
@@ -333,6 +338,18 @@ class Scene:
 def _table(table: Mapping[str, Any], key: str) -> dict[str, Any]:
     out: dict[str, Any] = plain(table, key)
     return out
+
+
+def _file_stems(scene: str, names: list[str]) -> list[str]:
+    """Stem of each body's files; bodies whose names differ only in what file names cannot hold get numbers."""
+    stems: list[str] = []
+    for name in names:
+        stem, number = f"{scene}_{file_stem(name)}", 1
+        while stem.casefold() in (s.casefold() for s in stems):
+            number += 1
+            stem = f"{scene}_{file_stem(name)}-{number}"
+        stems.append(stem)
+    return stems
 
 
 def _save_mesh(mesh: Mesh, scene: Path, stem: str) -> str:

@@ -213,3 +213,19 @@ def test_start_intersections_are_counted_and_named() -> None:
     bodies[0]["name"] = "sheet"
     allowed = cs.Scene(cloth=bodies, contact={"thickness": 0.002, "allow_intersections": True})
     assert len(cs.Simulation(allowed).intersections()) == caught.value.count
+
+
+def test_saved_bodies_whose_names_make_the_same_file_name_keep_their_own_meshes(tmp_path: Path) -> None:
+    scene = cs.Scene()
+    meshes = [cs.Mesh.grid(1.0, 1.0, n, n) for n in (2, 3, 4)]
+    for name, mesh in zip(("a/b", "a b", "A_b"), meshes, strict=True):
+        scene.add_cloth(mesh, name=name)
+    scene.save(tmp_path / "scene.toml")
+    again, _, _ = cs.Scene.load(tmp_path / "scene.toml").assets()
+    assert sorted(len(vertices) for vertices, _, _ in again.values()) == [4, 9, 16]
+
+
+@pytest.mark.parametrize("bodies", ["abc", {"name": "a"}, [1]])
+def test_bodies_that_are_no_list_of_tables_are_named(bodies: Any) -> None:
+    with pytest.raises(cs.InvalidScene, match="cloth: expected a list of tables"):
+        cs.Scene(cloth=bodies)
