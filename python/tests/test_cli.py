@@ -379,3 +379,29 @@ def test_a_missing_package_is_said_before_the_simulation(tmp_path: Path, run_cli
     assert done.returncode == 2
     assert f"output.{key} needs the package {package}: pip install" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+# A finished run is resumed only where it is what is asked for -------------------------------------------------------
+
+
+def test_a_finished_run_of_another_scene_is_not_taken_for_this_one(
+    tmp_path: Path, scene_file: Path, run_cli: RunCli
+) -> None:
+    out = tmp_path / "out"
+    assert run_cli("run", scene_file, "-o", out, "--frames", "1", "--quiet").returncode == 0
+    again = run_cli("run", scene_file, "-o", out, "--frames", "1", "--resume", "--quiet")
+    assert "complete already" in again.stdout
+    fewer = run_cli("run", scene_file, "-o", out, "--resume", "--quiet")
+    assert (fewer.returncode, "has 2 of 16 frames" in fewer.stderr) == (2, True), fewer.stderr
+    other = tmp_path / "other.toml"
+    other.write_text(SCENE.replace("duration = 0.5", "duration = 0.25"))
+    changed = run_cli("run", other, "-o", out, "--frames", "1", "--resume", "--quiet")
+    assert (changed.returncode, "has changed" in changed.stderr) == (2, True), changed.stderr
+
+
+@pytest.mark.parametrize("content", ['{"a":', "[]", "{}"])
+def test_a_damaged_report_is_named(tmp_path: Path, scene_file: Path, run_cli: RunCli, content: str) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "report.json").write_text(content)
+    done = run_cli("run", scene_file, "-o", tmp_path / "out", "--resume", "--quiet")
+    assert (done.returncode, "report.json is damaged" in done.stderr) == (2, True), done.stderr

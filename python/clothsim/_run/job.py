@@ -97,9 +97,7 @@ class Job:
         if folder.out.exists() and not folder.out.is_dir():
             raise OutputExists(f"{self.out}: expected a folder, got a file")
         if self.resume and not folder.started and (self.out / "report.json").exists():
-            report: dict[str, Any] = json.loads((self.out / "report.json").read_text())
-            report.pop("frames", None)
-            return {**report, "resumed": "complete already"}
+            return {**self._finished(), "resumed": "complete already"}
         if self.resume or self.overwrite:
             return None
         if folder.started:
@@ -109,6 +107,31 @@ class Job:
         if present := folder.present():
             raise OutputExists(f"{self.out}: holds a run already ({', '.join(present)}); --overwrite replaces it")
         return None
+
+    def _finished(self) -> dict[str, Any]:
+        """Return the report of the run in the folder, without its frames; refuse it if it is not what is asked for."""
+        anew = "--overwrite starts anew"
+        try:
+            report = json.loads((self.out / "report.json").read_bytes())
+            known = isinstance(report, dict) and {"scene_digest", "error", "frame_count", "totals"} <= report.keys()
+        except ValueError:
+            known = False
+        if not known:
+            raise CheckpointError(f"{self.out}: report.json is damaged or of another version; {anew}")
+        if report["scene_digest"] != digest(self.scene):
+            raise CheckpointError(
+                f"{self.out}: the finished run is of another scene, or the scene or one of its meshes has changed; "
+                f"{anew}"
+            )
+        if report["error"] is not None:
+            raise CheckpointError(f"{self.out}: the run ended with an error ({report['error']}); {anew}")
+        asked = 1 + len(frame_lengths(self.scene.duration, float(self.scene.output["fps"]))[: self.frames])
+        if report["frame_count"] < asked:
+            raise CheckpointError(
+                f"{self.out}: the finished run has {report['frame_count']} of {asked} frames, "
+                f"and its checkpoint is gone; {anew}"
+            )
+        return {key: value for key, value in report.items() if key != "frames"}
 
     def _new_simulation(self) -> Simulation:
         return Simulation(self.scene, self.threads, self.device, allow_intersections=self.allow_intersections)
@@ -136,7 +159,9 @@ class Job:
             times = np.array([line["time"] for line in lines])
             scene = self.scene.to_dict()
             recording = Recording(bodies, times, writer.rows(), standing, fps=fps, up=scene["up"], name=scene["name"])
-            outputs = Outputs(self.out, settings, recording, lines, simulation, facts.wall_seconds(), error)
+            outputs = Outputs(
+                self.out, settings, recording, lines, simulation, facts.wall_seconds(), error, fingerprint
+            )
             report = outputs.write(progress=self.progress)
         finally:
             writer.close()

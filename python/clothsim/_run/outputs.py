@@ -45,6 +45,7 @@ class Outputs:
         simulation: Simulation,
         wall_seconds: float,
         error: ClothSimError | None,
+        scene_digest: str,
     ) -> None:
         self._out = out
         self._settings = settings
@@ -53,6 +54,7 @@ class Outputs:
         self._simulation = simulation
         self._wall_seconds = wall_seconds
         self._error = error
+        self._scene_digest = scene_digest
 
     def write(self, *, progress: bool) -> dict[str, Any]:
         """Write everything, the report last; return it without its frames.
@@ -130,6 +132,7 @@ class Outputs:
             "python": platform.python_version(),
             "machine": platform.machine(),
             "threads": summary["threads"],
+            "scene_digest": self._scene_digest,
             "error": None if self._error is None else f"{type(self._error).__name__}: {self._error}",
             "simulated_seconds": self._simulation.time,
             "wall_seconds": self._wall_seconds,
