@@ -8,6 +8,8 @@ from clothsim.errors import GpuUnavailable, InvalidInput
 
 __all__ = ["check_device", "check_threads"]
 
+_MOST_THREADS = 65_536
+
 
 def check_device(device: str) -> str:
     """Return ``"cpu"`` for what this build can do; ``"auto"`` is the CPU too, as it is the only one."""
@@ -24,18 +26,16 @@ def check_device(device: str) -> str:
 
 
 def check_threads(threads: int | None) -> int | None:
-    """Refuse what is no number of threads."""
+    """Refuse what is no number of threads that a machine can have."""
     if threads is None:
         return None
     try:
         count = operator.index(threads)
     except TypeError:
         count = 0
-    if count < 1 or isinstance(threads, bool):
+    if not 1 <= count <= _MOST_THREADS or isinstance(threads, bool):
+        expected = "a whole number ≥ 1" if count < _MOST_THREADS else f"at most {_MOST_THREADS}"
         raise InvalidInput(
-            f"threads: expected a whole number ≥ 1, got {threads!r}",
-            name="threads",
-            expected="a whole number ≥ 1",
-            got=repr(threads),
+            f"threads: expected {expected}, got {threads!r}", name="threads", expected=expected, got=repr(threads)
         )
     return count

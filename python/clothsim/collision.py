@@ -8,13 +8,15 @@ from typing import Any, Literal
 from numpy.typing import ArrayLike, NDArray
 
 from clothsim import _core
-from clothsim._arrays import Floats, Ints, floats, indices
+from clothsim._arrays import Floats, Ints, floats, indices, number
 from clothsim._device import check_device, check_threads
 
 __all__ = ["Detection", "detect", "edge_edge_ccd", "self_intersections", "vertex_triangle_ccd"]
 
 Method = Literal["brute", "bvh"]
 Mode = Literal["continuous", "discrete"]
+
+_THICKNESS = "a finite length ≥ 0 m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +111,7 @@ def detect(
             indices(triangles, "triangles"),
             str(method),
             str(mode),
-            float(thickness),
+            number(thickness, "thickness", _THICKNESS),
             check_threads(threads),
         )
     )
@@ -139,7 +141,9 @@ def vertex_triangle_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDA
     >>> cs.collision.vertex_triangle_ccd([[[0.2, 1, 0.2], *still, [0.2, 0.5, 0.2], *still]])[0].tolist()
     [False]
     """
-    return _core.vertex_triangle_ccd(floats(queries, "queries", "shape (n, 8, 3)"), float(thickness))
+    return _core.vertex_triangle_ccd(
+        floats(queries, "queries", "shape (n, 8, 3)"), number(thickness, "thickness", _THICKNESS)
+    )
 
 
 def edge_edge_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDArray[Any], Floats]:
@@ -159,7 +163,9 @@ def edge_edge_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDArray[A
     time : (n,) float64
         Fraction of the step in [0, 1], never later than the true first time; infinity where there is no contact.
     """
-    return _core.edge_edge_ccd(floats(queries, "queries", "shape (n, 8, 3)"), float(thickness))
+    return _core.edge_edge_ccd(
+        floats(queries, "queries", "shape (n, 8, 3)"), number(thickness, "thickness", _THICKNESS)
+    )
 
 
 def self_intersections(x: ArrayLike, triangles: ArrayLike, *, threads: int | None = None) -> Ints:

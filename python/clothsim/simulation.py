@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from clothsim import _core
-from clothsim._arrays import Floats, Ints, optional
+from clothsim._arrays import Floats, Ints, number, optional
 from clothsim._device import check_device, check_threads
 from clothsim._files import write_whole
 from clothsim.errors import CheckpointError, InvalidInput
@@ -143,7 +143,7 @@ class Simulation:
         KeyboardInterrupt
             Between two steps; `finish_advance` (also after a checkpoint) does the rest with the same steps.
         """
-        self._core.advance(float(seconds))
+        self._core.advance(number(seconds, "seconds", "a finite number ≥ 0 [s]"))
 
     def finish_advance(self) -> None:
         """Do what an interrupted `advance` has left, to the same bits as without the interruption."""

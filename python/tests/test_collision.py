@@ -130,3 +130,22 @@ def test_self_intersections() -> None:
     assert found.dtype == np.int64
     flat = cs.Mesh.grid(1.0, 1.0, 9, 9)
     assert len(cs.collision.self_intersections(flat.vertices, flat.triangles)) == 0, "neighbours do not pass through"
+
+
+@pytest.mark.parametrize("thickness", [None, "x", True])
+def test_a_thickness_that_is_no_number_is_named(thickness: Any) -> None:
+    x = np.zeros((3, 3))
+    with pytest.raises(cs.InvalidInput, match="thickness: expected a finite length"):
+        cs.collision.detect(x, x, [[0, 1, 2]], thickness=thickness)
+
+
+def test_rows_of_unequal_length_are_named() -> None:
+    x = np.zeros((3, 3))
+    with pytest.raises(cs.InvalidInput, match="triangles: expected shape .*, got rows of unequal length"):
+        cs.collision.detect(x, x, [[0, 1], [0, 1, 2]])
+
+
+def test_more_threads_than_any_machine_has_are_refused() -> None:
+    x = np.zeros((3, 3))
+    with pytest.raises(cs.InvalidInput, match="threads: expected at most"):
+        cs.collision.detect(x, x, [[0, 1, 2]], threads=10**30)
