@@ -207,3 +207,24 @@ def test_an_unknown_suffix_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(cs.MeshError, match=r"can be written \(\.obj, \.ply\), got '\.stl'"):
         SEAM.save(tmp_path / "a.stl")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_fractional_face_indices_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "fraction.ply"
+    path.write_text(
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1\nproperty list uchar float vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2.5\n"
+    )
+    with pytest.raises(cs.MeshError, match=r"whole numbers as face indices, got \[0.0, 1.0, 2.5\]"):
+        cs.Mesh.load(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [("hello", "expected JSON"), ("ply\nformat weird 1.0\nend_header\n", "header line 'format weird 1.0'")],
+)
+def test_junk_is_named(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / ("junk.ply" if content.startswith("ply") else "junk.gltf")
+    path.write_text(content)
+    with pytest.raises(cs.MeshError, match=message):
+        cs.Mesh.load(path)

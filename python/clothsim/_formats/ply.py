@@ -58,6 +58,8 @@ def _parse(content: bytes) -> RawMesh:
     for element in elements:
         columns = body.read(element)
         if element.name == "vertex":
+            if missing := [axis for axis in "xyz" if axis not in columns]:
+                raise ValueError(f"element vertex has no property {', '.join(missing)}")
             vertices = np.stack([np.asarray(columns[axis], dtype=np.float64) for axis in "xyz"], axis=1)
             for pair in _UV_NAMES:
                 if all(key in columns for key in pair):
@@ -67,11 +69,21 @@ def _parse(content: bytes) -> RawMesh:
             lists = columns.get("vertex_indices", columns.get("vertex_index"))
             if lists is None:
                 raise ValueError("element face has neither vertex_indices nor vertex_index")
-            polygons = [np.asarray(polygon, dtype=np.int64) for polygon in lists]
+            polygons = [_whole(polygon) for polygon in lists]
     if vertices is None:
         raise ValueError("expected an element vertex, got none")
     triangles = _triangles(polygons, vertices)
     return RawMesh(vertices, triangles, None if uv is None else uv[triangles])
+
+
+def _whole(polygon: Any) -> Ints:
+    values = np.asarray(polygon)
+    if values.dtype.kind in "iu":
+        return values.astype(np.int64)
+    indices: Ints = values.astype(np.int64)
+    if not np.array_equal(indices, values):
+        raise ValueError(f"expected whole numbers as face indices, got {values.tolist()}")
+    return indices
 
 
 def _triangles(polygons: list[Ints], vertices: Floats) -> Ints:
@@ -107,6 +119,8 @@ def _header(content: bytes) -> tuple[str, list[_Element], int]:
     for line in content[:end].decode("ascii").splitlines()[1:]:
         match line.split():
             case ["format", kind, _]:
+                if kind not in _ORDERS:
+                    raise ValueError(f"header line {line!r}")
                 order = _ORDERS[kind]
             case ["element", element, count]:
                 elements.append(_Element(element, int(count)))
