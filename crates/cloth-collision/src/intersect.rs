@@ -2,6 +2,7 @@
 
 use crate::{Bvh, CollisionMesh, DetectError, Vec3};
 use robust::{Coord, Coord3D, orient2d, orient3d};
+use std::borrow::Cow;
 
 /// Pairs of triangles of one mesh that pass through each other, sorted; see [`intersections`].
 ///
@@ -35,7 +36,21 @@ pub fn intersections(
     x: &[Vec3],
     pool: &rayon::ThreadPool,
 ) -> Result<Vec<[u32; 2]>, DetectError> {
+    let x = &within_range(x)[..];
     Bvh::new_in(mesh, x, pool)?.intersections(mesh, x, pool)
+}
+
+/// Coordinates whose products of three neither overflow nor vanish: `x` itself, or, where its extent is beyond
+/// 10^±60, `x` times a power of two (exact) that brings the extent to about 1.
+fn within_range(x: &[Vec3]) -> Cow<'_, [Vec3]> {
+    let extent = x.iter().fold(0.0f64, |e, p| e.max(p.amax()));
+    if extent == 0.0 || !extent.is_finite() || (1e-60..1e60).contains(&extent) {
+        return Cow::Borrowed(x);
+    }
+    // Two factors: the inverse of a subnormal extent is not a finite number.
+    let half = (0.5 * extent.log2()).round();
+    let factor = (-half).exp2();
+    Cow::Owned(x.iter().map(|p| p * factor * factor).collect())
 }
 
 /// Whether two closed triangles have a common point (through a side of one of them; see [`intersections`]).

@@ -199,3 +199,27 @@ fn bad_input_is_named() {
         Err(DetectError::IndexOutOfRange { index: 3, .. })
     ));
 }
+
+#[test]
+fn extreme_sizes_are_decided() {
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.2, 0.2, -1.0],
+        [0.2, 0.2, 1.0],
+        [0.3, 0.3, 1.0],
+    ];
+    for exponent in [-300, -160, -59, 0, 61, 103, 300] {
+        let size = 10.0f64.powi(exponent);
+        let x: Vec<Vec3> = corners.iter().map(|&p| Vec3::from(p) * size).collect();
+        let found = self_intersections(&[[0, 1, 2], [3, 4, 5]], &x, &pool(1)).unwrap();
+        assert_eq!(found, [[0, 1]], "size {size:e}");
+        let apart: Vec<Vec3> =
+            x.iter().enumerate().map(|(i, p)| if i < 3 { *p } else { p + Vec3::x() * 2.0 * size }).collect();
+        assert!(
+            self_intersections(&[[0, 1, 2], [3, 4, 5]], &apart, &pool(1)).unwrap().is_empty(),
+            "size {size:e}"
+        );
+    }
+}
