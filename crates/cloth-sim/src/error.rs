@@ -27,7 +27,7 @@ pub enum SimError {
         names: Vec<String>,
     },
     /// The state became non-finite or ran away, at every step size tried.
-    #[error("diverged at t = {time} s: {reason}; vertices {}", list(vertices))]
+    #[error("diverged at t = {time} s: {reason}{}", if vertices.is_empty() { String::new() } else { format!("; vertices {}", list(vertices)) })]
     Diverged {
         /// Time of the last good state [s].
         time: f64,

@@ -195,6 +195,7 @@ fn unknown_choices_are_refused_with_the_known_ones() {
 #[test]
 fn values_out_of_range_are_refused_at_their_line() {
     check("dt = 0.005", "dt = 0.0", "time.dt", "> 0 [s]", "0");
+    check("tolerance = 1e-5", "tolerance = 1.5", "solver.tolerance", "< 1", "1.5");
     check("dt = 0.005", "dt = -0.005", "time.dt", "> 0 [s]", "-0.005");
     check("duration = 4.0", "duration = -1", "duration", "> 0 [s]", "-1");
     check("thickness = 0.003", "thickness = -0.003", "contact.thickness", "> 0 [m]", "-0.003");

@@ -19,7 +19,11 @@ impl Scene {
         if self.time.max_halvings > MAX_HALVINGS {
             return Err(self.error("time.max_halvings", "0 to 16", self.time.max_halvings.to_string()));
         }
-        self.positive("solver.tolerance", self.solver.tolerance, "")?;
+        // A relative residual of 1 is what no work at all reaches.
+        let tolerance = self.solver.tolerance;
+        if !(tolerance > 0.0 && tolerance < 1.0) {
+            return Err(self.error("solver.tolerance", "a number > 0 and < 1", tolerance.to_string()));
+        }
         self.at_least_one("solver.max_iterations", self.solver.max_iterations)?;
         self.finite("air.wind", &self.air.wind, "m/s")?;
         self.not_negative("air.density", self.air.density, "kg/m³")?;
