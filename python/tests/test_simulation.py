@@ -161,7 +161,8 @@ def test_two_threads_may_share_a_simulation() -> None:
 
 
 INTERRUPTED = """
-import sys, numpy as np, clothsim as cs
+import signal, sys, numpy as np, clothsim as cs
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 scene = cs.Scene.load(sys.argv[1])
 sim = cs.Simulation(scene, threads=1)
 print("ready", flush=True)
