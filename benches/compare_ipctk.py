@@ -9,8 +9,9 @@ What is timed, per scene, medians over the repeats, rounds interleaved so that a
 * ours: ``clothsim.collision.detect`` as a user calls it (checks, topology, tree, detection, arrays), 1 and 2 threads:
   every colliding pair with its time. ``self_intersections`` likewise: every pair.
 * IPC Toolkit, 1 and 2 threads: ``Candidates.build`` with ``LBVH``, then ``compute_collision_free_stepsize`` with
-  ``AdditiveCCD``: the earliest impact only. On one thread that is also a lower bound for additive CCD of all candidates,
-  for which its Python face has no call: it is the same loop, with each search cut off at the earliest impact so far.
+  ``AdditiveCCD``: the earliest impact only. On one thread that is also a lower bound for additive CCD of all
+  candidates, for which its Python face has no call: it is the same loop, with each search cut off at the
+  earliest impact so far.
 * IPC Toolkit ``has_intersections``, 1 and 2 threads: whether there is any.
 """
 
