@@ -48,6 +48,24 @@ def test_the_public_names() -> None:
     assert sim.collider_positions.shape == (sim.bodies[1].vertex_count, 3)
 
 
+def test_every_force_model_has_its_milliseconds() -> None:
+    sim = cs.Simulation(drop(9), threads=1)
+    before = {effect["name"]: effect["milliseconds"] for effect in sim.report["effects"]}
+    assert set(before.values()) == {None}
+    sim.advance(0.05)
+    report = sim.report
+    cost = {effect["name"]: effect["milliseconds"] for effect in report["effects"]}
+    for name in ("baraff-witkin", "hinge", "gravity", "integrator", "linear solver", "contact"):
+        assert cost[name] > 0.0, name
+    assert "spring" not in cost
+    assert "wind" not in cost
+    stages = sum(seconds for _, seconds in report["totals"]["seconds"])
+    timed = [milliseconds for milliseconds in cost.values() if milliseconds is not None]
+    assert sum(timed) == pytest.approx(1e3 * stages), "the rows do not overlap and leave no stage out"
+    forces = [sum(seconds for _, seconds in step["forces"]) for step in report["steps"]]
+    assert 1e3 * sum(forces) == pytest.approx(cost["baraff-witkin"] + cost["hinge"] + cost["gravity"])
+
+
 def test_positions_are_copies() -> None:
     sim = cs.Simulation(drop(5), threads=1)
     before = sim.positions

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::{
     Bending, CoreError, EffectInfo, Energy, Environment, InPlane, Material,
-    assembly::{Corners, ELEMENTS_PER_CHUNK, ROWS_PER_CHUNK},
+    assembly::{Corners, ELEMENTS_PER_CHUNK, ForceClock, ROWS_PER_CHUNK, timed},
     forces::{
         ForceModel,
         air::Air,
@@ -152,6 +152,24 @@ impl ClothSystem {
         effects
     }
 
+    /// Seconds of each effect by name, in the order of [`Self::effects`]; models of one name are summed.
+    pub(crate) fn seconds(&self, clock: &ForceClock) -> Vec<(&'static str, f64)> {
+        let mut list: Vec<(&'static str, f64)> = Vec::new();
+        let own = [("gravity", clock.gravity), ("air-damping", clock.air_damping)];
+        let own = own.into_iter().filter(|(name, _)| match *name {
+            "gravity" => self.gravity != Vec3::zeros(),
+            _ => self.air_damping > 0.0,
+        });
+        let models = self.models.iter().zip(&clock.models).map(|(m, s)| (m.info().name, *s));
+        for (name, seconds) in models.chain(own) {
+            match list.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, sum)) => *sum += seconds,
+                None => list.push((name, seconds)),
+            }
+        }
+        list
+    }
+
     pub(crate) fn models(&self) -> &[Box<dyn ForceModel>] {
         &self.models
     }
@@ -173,14 +191,29 @@ impl ClothSystem {
     }
 
     /// `scale` times the sum of corner forces, gravity and air damping at each vertex. Call on the pool.
-    pub(crate) fn gather(&self, corners: &Corners, v: &[Vec3], scale: f64, out: &mut [Vec3]) {
+    ///
+    /// Gravity and air damping go before, as accelerations in passes of their own, and are timed. The corner forces of
+    /// all models are taken in one pass over the vertices, which has no part per model.
+    pub(crate) fn gather(&self, corners: &mut Corners, v: &[Vec3], scale: f64, out: &mut [Vec3]) {
+        let Corners { forces, clock } = corners;
+        if self.gravity == Vec3::zeros() {
+            out.fill(Vec3::zeros());
+        } else {
+            timed(&mut clock.gravity, || out.fill(self.gravity));
+        }
+        if self.air_damping > 0.0 {
+            timed(&mut clock.air_damping, || {
+                for (out, v) in out.iter_mut().zip(v) {
+                    *out -= (v - self.wind) * self.air_damping;
+                }
+            });
+        }
         out.par_chunks_mut(ROWS_PER_CHUNK).enumerate().for_each(|(chunk, out)| {
             for (vertex, out) in (chunk * ROWS_PER_CHUNK..).zip(out) {
-                let external = self.gravity - (v[vertex] - self.wind) * self.air_damping;
-                let mut sum = external * self.masses[vertex];
+                let mut sum = *out * self.masses[vertex];
                 let refs = self.corner_offsets[vertex] as usize..self.corner_offsets[vertex + 1] as usize;
                 for &corner in &self.corner_refs[refs] {
-                    sum += corners.forces[corner as usize];
+                    sum += forces[corner as usize];
                 }
                 *out = sum * scale;
             }
@@ -189,19 +222,21 @@ impl ClothSystem {
 
     /// Elastic and gravity energy, and the potential of air damping over a step: what the forces on a step's end are
     /// the gradient of where no model dissipates. Summed by chunks in order. Call on the pool.
-    pub(crate) fn potential(&self, x: &[Vec3], v: &[Vec3], dt: f64) -> f64 {
+    pub(crate) fn potential(&self, x: &[Vec3], v: &[Vec3], dt: f64, clock: &mut ForceClock) -> f64 {
         let mut sum = 0.0;
-        for model in &self.models {
+        for (model, seconds) in self.models.iter().zip(&mut clock.models) {
             let count = model.count();
-            let parts: Vec<f64> = (0..count.div_ceil(ELEMENTS_PER_CHUNK))
-                .into_par_iter()
-                .map(|chunk| {
-                    let start = chunk * ELEMENTS_PER_CHUNK;
-                    let mut energy = Energy::default();
-                    model.add_energy(start..(start + ELEMENTS_PER_CHUNK).min(count), x, &mut energy);
-                    energy.elastic()
-                })
-                .collect();
+            let parts: Vec<f64> = timed(seconds, || {
+                (0..count.div_ceil(ELEMENTS_PER_CHUNK))
+                    .into_par_iter()
+                    .map(|chunk| {
+                        let start = chunk * ELEMENTS_PER_CHUNK;
+                        let mut energy = Energy::default();
+                        model.add_energy(start..(start + ELEMENTS_PER_CHUNK).min(count), x, &mut energy);
+                        energy.elastic()
+                    })
+                    .collect()
+            });
             sum += parts.iter().sum::<f64>();
         }
         for ((m, x), v) in self.masses.iter().zip(x).zip(v) {

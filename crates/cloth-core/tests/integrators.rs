@@ -305,3 +305,32 @@ fn bad_steps_are_refused_and_change_nothing() {
     x[2].y = f64::NAN;
     assert!(matches!(integrator.step(&mut x, &mut v, 0.0, 0.01, &FREE), Err(StepError::Solver(_))));
 }
+
+/// Sums of clock readings in two orders.
+const CLOCK_ROUNDING: f64 = 1e-12;
+
+#[test]
+fn every_force_that_is_built_is_timed_within_its_stages() {
+    let mesh = sheet(1.0, 20);
+    let (x, v) = wavy(&mesh, 0.05, 1.0);
+    let still = Environment { air_density: 0.0, air_damping: 0.0, ..AIR };
+    for method in [Method::Rk4, Method::ImplicitEuler, Method::ImplicitNewton] {
+        for (material, env, expected) in [
+            (SOFT, AIR, &["baraff-witkin", "hinge", "wind", "gravity", "air-damping"][..]),
+            (SPRINGS, still, &["spring", "bending-spring", "gravity"][..]),
+        ] {
+            let mut integrator = integrator(system(&mesh, &material, &env), params(method));
+            let (mut x, mut v) = (x.clone(), v.clone());
+            for _ in 0..2 {
+                let info = integrator.step(&mut x, &mut v, 0.0, 1e-3, &FREE).unwrap();
+                let names: Vec<_> = info.forces.iter().map(|f| f.0).collect();
+                assert_eq!(names, expected, "{method:?}");
+                assert!(info.forces.iter().all(|f| f.1 > 0.0), "{method:?}: {:?}", info.forces);
+                // Each reading lies between the two readings of a stage, and the stages do not overlap.
+                let forces: f64 = info.forces.iter().map(|f| f.1).sum();
+                let stages: f64 = info.seconds.iter().filter(|s| s.0 != "solve").map(|s| s.1).sum();
+                assert!(forces <= stages * (1.0 + CLOCK_ROUNDING), "{method:?}: {info:?}");
+            }
+        }
+    }
+}

@@ -42,6 +42,8 @@ pub struct StepReport {
     pub intersections: Option<usize>,
     /// Seconds per stage, in the order in which the stages run.
     pub seconds: Vec<(String, f64)>,
+    /// Seconds per force model, a part of the stages' ("forces", "linearise", "assemble", "line search").
+    pub forces: Vec<(String, f64)>,
 }
 
 /// Contact in one step.
@@ -120,17 +122,24 @@ pub struct EffectCost {
     pub elements: usize,
     /// Memory of its data [B].
     pub bytes: usize,
-    /// Milliseconds in all steps so far; `None` for an effect that is timed as part of another (a force model as part of
-    /// the integrator, self-contact and friction as part of contact).
+    /// Wall-clock milliseconds in all steps so far; the rows do not overlap and add up to the stages. `None` for an
+    /// effect that is timed as part of another (self-contact and friction as part of contact).
+    ///
+    /// A force model has what its elements take: forces, couplings and energies. Summing corner forces at the vertices
+    /// and couplings into the matrix goes over all models at once; it is the integrator's, as is all that its stages
+    /// take besides the models.
     pub milliseconds: Option<f64>,
 }
 
+/// The effect whose stages hold the time of the force models.
+const FORCES_WITHIN: &str = "integrator";
+
 /// The effect that a stage of the step is counted under: an effect of the stage's own name, or one of these.
 const STAGES: [(&str, &str); 10] = [
-    ("forces", "integrator"),
-    ("linearise", "integrator"),
-    ("assemble", "integrator"),
-    ("line search", "integrator"),
+    ("forces", FORCES_WITHIN),
+    ("linearise", FORCES_WITHIN),
+    ("assemble", FORCES_WITHIN),
+    ("line search", FORCES_WITHIN),
     ("solve", "linear solver"),
     ("proximity", "contact"),
     ("impulses", "contact"),
@@ -160,11 +169,19 @@ impl Report {
         }
         for (stage, seconds) in &step.seconds {
             let name = STAGES.iter().find(|(known, _)| known == stage).map_or(stage.as_str(), |s| s.1);
-            if let Some(effect) = self.effects.iter_mut().find(|e| e.name == name) {
-                *effect.milliseconds.get_or_insert(0.0) += 1e3 * seconds;
-            }
+            add_milliseconds(&mut self.effects, name, 1e3 * seconds);
+        }
+        for (name, seconds) in &step.forces {
+            add_milliseconds(&mut self.effects, name, 1e3 * seconds);
+            add_milliseconds(&mut self.effects, FORCES_WITHIN, -1e3 * seconds);
         }
         self.steps.push(step);
+    }
+}
+
+fn add_milliseconds(effects: &mut [EffectCost], name: &str, milliseconds: f64) {
+    if let Some(effect) = effects.iter_mut().find(|e| e.name == name) {
+        *effect.milliseconds.get_or_insert(0.0) += milliseconds;
     }
 }
 

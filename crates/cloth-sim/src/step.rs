@@ -276,6 +276,9 @@ impl Simulation {
         for (name, seconds) in &info.seconds {
             add_seconds(&mut report.seconds, name, *seconds);
         }
+        for (name, seconds) in &info.forces {
+            add_seconds(&mut report.forces, name, *seconds);
+        }
         Ok(info)
     }
 

@@ -240,6 +240,16 @@ fn the_report_adds_up() {
     let timed: f64 = report.effects.iter().filter_map(|e| e.milliseconds).sum();
     assert!((timed - 1e3 * staged).abs() < 1e-6, "every stage is counted under an effect: {report:?}");
     assert!(cost("contact") > Some(0.0) && cost("linear solver") > Some(0.0) && cost("friction").is_none());
+    // Force models, within the integrator's stages.
+    for name in ["baraff-witkin", "hinge", "gravity", "integrator"] {
+        assert!(cost(name) > Some(0.0), "{name}: {report:?}");
+    }
+    for name in ["spring", "wind", "air-damping"] {
+        assert!(report.effects.iter().all(|e| e.name != name), "{name} does not run: {report:?}");
+    }
+    let models: f64 = report.steps.iter().flat_map(|s| &s.forces).map(|(_, s)| s).sum();
+    let listed: f64 = ["baraff-witkin", "hinge", "gravity"].iter().filter_map(|n| cost(n)).sum();
+    assert!((1e3 * models - listed).abs() < 1e-6, "{models} {listed}");
     let json = serde_json::to_string(report).unwrap();
     assert_eq!(&serde_json::from_str::<cloth_sim::Report>(&json).unwrap(), report);
 }

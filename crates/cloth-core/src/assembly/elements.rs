@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::ELEMENTS_PER_CHUNK;
+use super::{ELEMENTS_PER_CHUNK, ForceClock, timed};
 use crate::{
     forces::{Block, CouplingKind, Couplings, ForceModel, Linear, Outer, Psd, corner_pairs},
     mesh::Vec3,
@@ -15,26 +15,32 @@ pub(crate) struct ElementBuffers {
     pub(crate) diagonal: Vec<f64>,
 }
 
-/// Room for the corner forces of every element of every model.
+/// Room for the corner forces of every element of every model, and what their evaluation took.
 pub(crate) struct Corners {
     pub(crate) forces: Vec<Vec3>,
+    pub(crate) clock: ForceClock,
 }
 
 impl Corners {
     pub(crate) fn new(models: &[Box<dyn ForceModel>]) -> Self {
-        Self { forces: vec![Vec3::zeros(); models.iter().map(|m| m.vertices().len()).sum()] }
+        Self {
+            forces: vec![Vec3::zeros(); models.iter().map(|m| m.vertices().len()).sum()],
+            clock: ForceClock::new(models.len()),
+        }
     }
 
     /// Evaluates the forces of all models. Call on the pool.
     pub(crate) fn evaluate(&mut self, models: &[Box<dyn ForceModel>], x: &[Vec3], v: &[Vec3]) {
-        let mut rest = self.forces.as_mut_slice();
-        for model in models {
+        let mut forces = self.forces.as_mut_slice();
+        for (model, seconds) in models.iter().zip(&mut self.clock.models) {
             let corners = model.corners();
-            let (mine, others) = rest.split_at_mut(model.vertices().len());
-            rest = others;
-            mine.par_chunks_mut(ELEMENTS_PER_CHUNK * corners).enumerate().for_each(|(chunk, out)| {
-                let start = chunk * ELEMENTS_PER_CHUNK;
-                model.forces(start..start + out.len() / corners, x, v, out);
+            let mine;
+            (mine, forces) = std::mem::take(&mut forces).split_at_mut(model.vertices().len());
+            timed(seconds, || {
+                mine.par_chunks_mut(ELEMENTS_PER_CHUNK * corners).enumerate().for_each(|(chunk, out)| {
+                    let start = chunk * ELEMENTS_PER_CHUNK;
+                    model.forces(start..start + out.len() / corners, x, v, out);
+                });
             });
         }
     }
@@ -69,20 +75,20 @@ impl ElementBuffers {
         let mut forces = corners.forces.as_mut_slice();
         let (mut blocks, mut outer, mut diagonal) =
             (self.blocks.as_mut_slice(), self.outer.as_mut_slice(), self.diagonal.as_mut_slice());
-        for model in models {
+        for (model, seconds) in models.iter().zip(&mut corners.clock.models) {
             let n = model.corners();
-            let (f, others) = forces.split_at_mut(model.vertices().len());
-            forces = others;
+            let f;
+            (f, forces) = std::mem::take(&mut forces).split_at_mut(model.vertices().len());
             let f = f.par_chunks_mut(ELEMENTS_PER_CHUNK * n).enumerate();
             let range = |chunk: usize, f: &[Vec3]| {
                 let start = chunk * ELEMENTS_PER_CHUNK;
                 start..start + f.len() / n
             };
-            match model.coupling(linear.psd) {
+            timed(seconds, || match model.coupling(linear.psd) {
                 CouplingKind::Blocks => {
                     let per_element = corner_pairs(n).len();
-                    let (mine, others) = blocks.split_at_mut(model.count() * per_element);
-                    blocks = others;
+                    let mine;
+                    (mine, blocks) = std::mem::take(&mut blocks).split_at_mut(model.count() * per_element);
                     f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK * per_element)).for_each(
                         |((chunk, f), c)| {
                             model.linearise(range(chunk, f), x, v, linear, f, Couplings::Blocks(c));
@@ -90,20 +96,20 @@ impl ElementBuffers {
                     );
                 }
                 CouplingKind::Outer => {
-                    let (mine, others) = outer.split_at_mut(model.count());
-                    outer = others;
+                    let mine;
+                    (mine, outer) = std::mem::take(&mut outer).split_at_mut(model.count());
                     f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|((chunk, f), c)| {
                         model.linearise(range(chunk, f), x, v, linear, f, Couplings::Outer(c));
                     });
                 }
                 CouplingKind::Diagonal => {
-                    let (mine, others) = diagonal.split_at_mut(model.count());
-                    diagonal = others;
+                    let mine;
+                    (mine, diagonal) = std::mem::take(&mut diagonal).split_at_mut(model.count());
                     f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|((chunk, f), c)| {
                         model.linearise(range(chunk, f), x, v, linear, f, Couplings::Diagonal(c));
                     });
                 }
-            }
+            });
         }
     }
 

@@ -3,14 +3,19 @@
 //! Two phases, both parallel: elements write their couplings and corner forces into arrays of their own; then each row
 //! of the matrix, and each vertex, gathers what belongs to it in a fixed order. Nothing is added from two places at a
 //! time, so the bits do not depend on the number of threads.
+//!
+//! The first phase goes model by model and is timed per model. In the second a row takes what all models wrote in one
+//! pass: its time has no part per model and counts as assembly.
 
 mod block_csr;
+mod clock;
 mod elements;
 mod gather;
 mod pattern;
 pub(crate) mod simd;
 
 pub(crate) use block_csr::{BlockMatrix, Lanes};
+pub(crate) use clock::{ForceClock, timed};
 pub(crate) use elements::{Corners, ElementBuffers};
 pub(crate) use gather::Assembler;
 pub(crate) use pattern::Pattern;

@@ -29,6 +29,8 @@ pub(super) struct Workspace {
 /// Seconds per stage of one step.
 #[derive(Default)]
 pub(super) struct Clock {
+    /// Forces at the start of Newton's method.
+    pub(super) forces: f64,
     linearise: f64,
     assemble: f64,
     solve: f64,
@@ -37,11 +39,10 @@ pub(super) struct Clock {
 
 impl Clock {
     pub(super) fn seconds(&self) -> Vec<(&'static str, f64)> {
-        let mut seconds =
-            vec![("linearise", self.linearise), ("assemble", self.assemble), ("solve", self.solve)];
-        if self.line_search > 0.0 {
-            seconds.push(("line search", self.line_search));
-        }
+        let newton = |(_, seconds): &(&str, f64)| *seconds > 0.0;
+        let mut seconds: Vec<_> = [("forces", self.forces)].into_iter().filter(newton).collect();
+        seconds.extend([("linearise", self.linearise), ("assemble", self.assemble), ("solve", self.solve)]);
+        seconds.extend([("line search", self.line_search)].into_iter().filter(newton));
         seconds
     }
 }
@@ -93,6 +94,19 @@ impl Workspace {
         self.assembler.gather(&mut self.matrix, &|row| scale * masses[row]);
         self.clock.linearise += (middle - start).as_secs_f64();
         self.clock.assemble += middle.elapsed().as_secs_f64();
+    }
+
+    /// Sets the clocks to zero.
+    pub(super) fn start(&mut self) {
+        self.clock = Clock::default();
+        self.corners.clock.reset();
+    }
+
+    /// b = dt times the forces at the vertices, from the corner forces.
+    pub(super) fn gather(&mut self, system: &ClothSystem, v: &[Vec3], dt: f64) {
+        let start = Instant::now();
+        system.gather(&mut self.corners, v, dt, &mut self.b);
+        self.clock.assemble += start.elapsed().as_secs_f64();
     }
 
     /// Solves A dv = b; `dv` holds the prescribed values on entry.

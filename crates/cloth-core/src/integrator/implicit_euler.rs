@@ -2,7 +2,7 @@
 //!
 //! Source: thesis (3.20)–(3.25), with dt K_x v in the right-hand side; Baraff and Witkin 1998 for the pins.
 
-use super::{IntegratorParams, Prescribed, StepInfo, implicit::Clock, implicit::Workspace};
+use super::{IntegratorParams, Prescribed, StepInfo, implicit::Workspace};
 use crate::{ClothSystem, StepError, mesh::Vec3};
 
 pub(super) fn step(
@@ -14,9 +14,9 @@ pub(super) fn step(
     dt: f64,
     pins: &Prescribed<'_>,
 ) -> Result<StepInfo, StepError> {
-    work.clock = Clock::default();
+    work.start();
     work.linearise(system, params.psd, x, v, dt, dt);
-    system.gather(&work.corners, v, dt, &mut work.b);
+    work.gather(system, v, dt);
     for (&vertex, x_t1) in pins.pins.vertices.iter().zip(pins.pins.x_t1) {
         let i = vertex as usize;
         work.dv[i] = (x_t1 - x[i]) / dt - v[i];
@@ -33,5 +33,6 @@ pub(super) fn step(
         residual: solved.residual,
         converged: solved.converged,
         seconds: work.clock.seconds(),
+        forces: system.seconds(&work.corners.clock),
     })
 }

@@ -90,8 +90,13 @@ pub struct StepInfo {
     pub residual: f64,
     /// Whether every tolerance was met before its cap.
     pub converged: bool,
-    /// Seconds per stage.
+    /// Wall-clock seconds per stage.
     pub seconds: Vec<(&'static str, f64)>,
+    /// Wall-clock seconds per force model, named and ordered as [`ClothSystem::effects`]; a part of the stages'.
+    ///
+    /// Counts what is done element by element (forces, couplings, energies). What all models share, summing corner
+    /// forces at vertices and couplings into matrix blocks, stays with the stage: "assemble", "forces", "line search".
+    pub forces: Vec<(&'static str, f64)>,
 }
 
 /// Advances the state of a [`ClothSystem`]. Holds work space only: a step depends on its arguments alone.

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use super::{
     IntegratorParams, Prescribed, StepInfo,
-    implicit::{Clock, Workspace},
+    implicit::Workspace,
     line_search::{Merit, accepted},
 };
 use crate::{ClothSystem, StepError, mesh::Vec3};
@@ -27,7 +27,7 @@ pub(super) fn step(
     dt: f64,
     pins: &Prescribed<'_>,
 ) -> Result<StepInfo, StepError> {
-    work.clock = Clock::default();
+    work.start();
     let conservative = !system.dissipates();
     let (mut x1, mut v1) = (std::mem::take(&mut work.x), std::mem::take(&mut work.v));
     v1.copy_from_slice(v);
@@ -59,7 +59,9 @@ fn iterate(
     let mut info = StepInfo::default();
     let mut floor = 0.0;
     advance(x, v1, dt, x1);
+    let start = Instant::now();
     let mut merit = evaluate(work, system, v, x1, v1, dt, pins);
+    work.clock.forces += start.elapsed().as_secs_f64();
     let first = merit.residual;
     loop {
         info.residual = if first > 0.0 { merit.residual / first } else { 0.0 };
@@ -113,6 +115,7 @@ fn iterate(
         }
     }
     info.seconds = work.clock.seconds();
+    info.forces = system.seconds(&work.corners.clock);
     Ok(info)
 }
 
@@ -134,8 +137,8 @@ fn evaluate(
     pins: &Prescribed<'_>,
 ) -> Merit {
     work.corners.evaluate(system.models(), x1, v1);
-    system.gather(&work.corners, v1, -dt, &mut work.residual);
-    let mut potential = system.potential(x1, v1, dt);
+    system.gather(&mut work.corners, v1, -dt, &mut work.residual);
+    let mut potential = system.potential(x1, v1, dt, &mut work.corners.clock);
     let mut squares = 0.0;
     for (i, (r, m)) in work.residual.iter_mut().zip(system.masses()).enumerate() {
         let dv = v1[i] - v0[i];
