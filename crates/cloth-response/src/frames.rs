@@ -1,7 +1,7 @@
 //! The motions of what is prescribed: colliders and pinned cloth.
 
 use crate::Vec3;
-use crate::motion::Motion;
+use crate::motion::{Motion, bytes_of};
 use crate::rigid_motion::RigidMap;
 use cloth_collision::CollisionMesh;
 use cloth_collision::mesh::NONE;
@@ -37,6 +37,11 @@ impl Frames {
         self.maps.push(RigidMap::still());
         self.bodies.clear();
         self.bodies.resize(body_count, BodyMotion::Unknown);
+    }
+
+    /// Memory [B].
+    pub(crate) fn bytes(&self) -> usize {
+        bytes_of(&self.maps) + bytes_of(&self.bodies)
     }
 
     pub(crate) fn map(&self, frame: Frame) -> &RigidMap {

@@ -31,6 +31,35 @@ pub(crate) struct MotionBuffers {
     written: u32,
 }
 
+impl MotionBuffers {
+    /// Room for so many vertices.
+    pub(crate) fn with_capacity(vertices: usize) -> Self {
+        Self {
+            end: Vec::with_capacity(vertices),
+            velocity: Vec::with_capacity(vertices),
+            velocity_start: Vec::with_capacity(vertices),
+            touched: Vec::with_capacity(vertices),
+            changed: Vec::with_capacity(vertices),
+            tick: 0,
+            written: 0,
+        }
+    }
+
+    /// Memory [B].
+    pub(crate) fn bytes(&self) -> usize {
+        bytes_of(&self.end)
+            + bytes_of(&self.velocity)
+            + bytes_of(&self.velocity_start)
+            + bytes_of(&self.touched)
+            + bytes_of(&self.changed)
+    }
+}
+
+/// Memory that a list holds on to [B].
+pub(crate) fn bytes_of<T>(list: &Vec<T>) -> usize {
+    list.capacity() * size_of::<T>()
+}
+
 impl<'a> Motion<'a> {
     pub(crate) fn new(
         buffers: &'a mut MotionBuffers,

@@ -3,7 +3,7 @@
 use crate::collisions::{APPROACH, Detection, Hit, look_again, unresolved};
 use crate::frames::Frames;
 use crate::hold::hold_back;
-use crate::motion::{Motion, MotionBuffers};
+use crate::motion::{Motion, MotionBuffers, bytes_of};
 use crate::repulsion::{self, BAND};
 use crate::sweeps::ContactSet;
 use crate::zones::{Zones, move_zones};
@@ -38,7 +38,7 @@ impl Responder {
         Ok(Self {
             params,
             rest_x: Vec::new(),
-            buffers: MotionBuffers::default(),
+            buffers: MotionBuffers::with_capacity(mesh.vertex_count),
             contacts: ContactSet::default(),
             frames: Frames::default(),
             zones: Zones::default(),
@@ -58,6 +58,20 @@ impl Responder {
         check("rest_x", rest_x, mesh.vertex_count)?;
         self.rest_x = rest_x.to_vec();
         Ok(())
+    }
+
+    /// Memory of the buffers that are kept from step to step \[B\]: what each vertex needs from the start, and what the
+    /// contacts of the steps so far have needed.
+    pub fn bytes(&self) -> usize {
+        // A hash set's slots: one byte of control each.
+        let slots = self.shared.capacity() * (size_of::<[u32; 4]>() + 1);
+        bytes_of(&self.rest_x)
+            + self.buffers.bytes()
+            + self.contacts.bytes()
+            + self.frames.bytes()
+            + self.zones.bytes()
+            + bytes_of(&self.hits)
+            + slots
     }
 
     /// Changes `x_t1` and `v` so that the straight motion `x_t0` → `x_t1` has no known collision.

@@ -13,7 +13,7 @@
 
 use crate::Vec3;
 use crate::impulse::Contact;
-use crate::motion::Motion;
+use crate::motion::{Motion, bytes_of};
 
 /// Cap on sweeps as a multiple of `max_sweeps`: sweeps that look at few contacts cost little.
 const CHEAP_SWEEPS: usize = 10;
@@ -49,6 +49,11 @@ impl ContactSet {
     pub(crate) fn push(&mut self, contact: Contact) {
         self.looks.push((contact.vertices, 0));
         self.contacts.push(contact);
+    }
+
+    /// Memory [B].
+    pub(crate) fn bytes(&self) -> usize {
+        bytes_of(&self.contacts) + bytes_of(&self.looks) + bytes_of(&self.change) + bytes_of(&self.direction)
     }
 
     /// Contacts that carry an impulse.

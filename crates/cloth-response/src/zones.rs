@@ -7,7 +7,7 @@
 
 use crate::collisions::{Detection, Hit, look_again};
 use crate::frames::Frames;
-use crate::motion::Motion;
+use crate::motion::{Motion, bytes_of};
 use crate::rigid_motion::RigidMap;
 use crate::{ResponseInfo, ResponseParams, Vec3};
 use cloth_collision::DetectError;
@@ -34,6 +34,11 @@ struct Zone {
 }
 
 impl Zones {
+    /// Memory [B].
+    pub(crate) fn bytes(&self) -> usize {
+        bytes_of(&self.parent) + bytes_of(&self.members) + bytes_of(&self.ties)
+    }
+
     fn clear(&mut self, vertex_count: usize) {
         self.parent.clear();
         self.parent.resize(vertex_count, NONE);

@@ -19,7 +19,7 @@ pub struct Effect {
     pub why: String,
     /// Number of elements (0 if off).
     pub elements: usize,
-    /// Memory of its data [B] (0 if off).
+    /// Memory of its data before the first step [B] (0 if off).
     pub bytes: usize,
 }
 

@@ -120,7 +120,7 @@ pub struct EffectCost {
     pub name: String,
     /// Number of elements.
     pub elements: usize,
-    /// Memory of its data [B].
+    /// Memory of its data [B]; for contact, whose buffers grow with what touches, the most so far.
     pub bytes: usize,
     /// Wall-clock milliseconds in all steps so far; the rows do not overlap and add up to the stages. `None` for an
     /// effect that is timed as part of another (self-contact and friction as part of contact).
@@ -149,6 +149,13 @@ const STAGES: [(&str, &str); 10] = [
 ];
 
 impl Report {
+    /// Notes the memory that an effect holds now [B].
+    pub(crate) fn grow(&mut self, effect: &str, bytes: usize) {
+        if let Some(effect) = self.effects.iter_mut().find(|e| e.name == effect) {
+            effect.bytes = effect.bytes.max(bytes);
+        }
+    }
+
     /// Adds a step and its wall-clock seconds.
     pub(crate) fn push(&mut self, step: StepReport, wall_seconds: f64) {
         let t = &mut self.totals;

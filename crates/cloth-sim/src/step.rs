@@ -125,7 +125,7 @@ impl ContactStage {
         intersections(&self.mesh, x, pool).map_err(|e| stage("intersections", &e))
     }
 
-    /// Memory of the collision topology [B].
+    /// Memory of the collision topology and of the response's buffers, which grow with the contacts [B].
     pub(crate) fn bytes(&self) -> usize {
         let mesh = &self.mesh;
         size_of_val(&mesh.triangles[..])
@@ -135,6 +135,7 @@ impl ContactStage {
             + size_of_val(&mesh.attached_to[..])
             + size_of_val(&mesh.vertex_owner[..])
             + size_of_val(&mesh.edge_owner[..])
+            + self.responder.bytes()
     }
 }
 
@@ -192,6 +193,9 @@ impl Simulation {
             add_seconds(&mut report.seconds, "intersection count", clock.elapsed().as_secs_f64());
         }
         self.report.push(report, started.elapsed().as_secs_f64());
+        if let Some(contact) = &self.contact {
+            self.report.grow("contact", contact.bytes());
+        }
         Ok(())
     }
 

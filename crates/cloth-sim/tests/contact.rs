@@ -220,6 +220,29 @@ fn the_plan_lists_what_runs_and_nothing_else() {
     }
 }
 
+/// Least memory of a vertex in contact [B]: rest position, three vectors of the motion, its marks.
+const VERTEX_BYTES: usize = 24 + 3 * 24 + 4 + 1;
+
+#[test]
+fn contact_counts_the_memory_of_its_buffers() {
+    let mut sim = simulation(&drape(9));
+    let bytes = |sim: &Simulation| {
+        let effects = &sim.report().effects;
+        effects.iter().find(|e| e.name == "contact").expect("an effect").bytes
+    };
+    let start = bytes(&sim);
+    let planned = sim.plan().effects.iter().find(|e| e.name == "contact").map(|e| e.bytes);
+    assert_eq!(planned, Some(start));
+    let (vertices, triangles) = (sim.all_positions().len(), sim.plan().triangles);
+    let topology = triangles * (2 * size_of::<[u32; 3]>());
+    assert!(start >= topology + vertices * VERTEX_BYTES, "{start}");
+    advance(&mut sim, 0.2).unwrap();
+    let draped = bytes(&sim);
+    assert!(draped > start, "contacts take room: {draped}");
+    let resumed = Simulation::resume(&sim.checkpoint(), None).unwrap();
+    assert!(bytes(&resumed) >= draped, "the most so far");
+}
+
 #[test]
 fn the_report_adds_up() {
     let mut sim = simulation(&drape(9));
