@@ -15,6 +15,24 @@ pub enum CoreError {
         /// What came.
         got: f64,
     },
+    /// A parameter is not given that is needed beside those that are.
+    #[error("{name}: expected {expected}, got nothing")]
+    Missing {
+        /// Name of the parameter.
+        name: &'static str,
+        /// What was expected, with the unit.
+        expected: &'static str,
+    },
+    /// An entry of an array is not a finite number.
+    #[error("{name}: expected finite numbers, entry {index} is {got}")]
+    NotFinite {
+        /// Name of the array.
+        name: &'static str,
+        /// The first such entry.
+        index: usize,
+        /// What it holds.
+        got: f64,
+    },
     /// The library has no material of this name.
     #[error("material: expected one of {known:?}, got \"{got}\"")]
     UnknownMaterial {

@@ -11,6 +11,7 @@
 
 pub use cloth_mesh as mesh;
 
+pub mod bending;
 mod forces;
 pub mod material;
 mod solver;

@@ -5,10 +5,11 @@ use rayon::prelude::*;
 use crate::{
     Bending, CoreError, EffectInfo, Energy, Environment, InPlane, Material,
     assembly::{Corners, ELEMENTS_PER_CHUNK, ForceClock, ROWS_PER_CHUNK, timed},
+    bending::{BendingLaw, Linear},
     forces::{
         ForceModel,
         air::Air,
-        hinge::{Hinges, LinearLaw, Rest, dihedral_angle},
+        hinge::{Hinges, Rest, dihedral_angle},
         spring::{Role, Springs},
         stretch_shear::{Stiffness, StretchShear},
     },
@@ -41,6 +42,8 @@ pub struct ClothSystem {
     corner_offsets: Vec<u32>,
     /// Corners of each vertex, over all models in order.
     corner_refs: Vec<u32>,
+    /// Bending that the scheme steps by itself: the same vertices, without gravity and air.
+    apart: Option<Box<ClothSystem>>,
 }
 
 impl ClothSystem {
@@ -86,19 +89,7 @@ impl ClothSystem {
             }));
         }
 
-        let mut corner_offsets = vec![0u32; cloth_vertex_count + 1];
-        for &v in models.iter().flat_map(|m| m.vertices()) {
-            corner_offsets[v as usize + 1] += 1;
-        }
-        for v in 0..cloth_vertex_count {
-            corner_offsets[v + 1] += corner_offsets[v];
-        }
-        let mut next = corner_offsets.clone();
-        let mut corner_refs = vec![0u32; corner_offsets[cloth_vertex_count] as usize];
-        for (corner, &v) in models.iter().flat_map(|m| m.vertices()).enumerate() {
-            corner_refs[next[v as usize] as usize] = corner as u32;
-            next[v as usize] += 1;
-        }
+        let (corner_offsets, corner_refs) = corners_by_vertex(&models, cloth_vertex_count);
         Ok(Self {
             masses,
             gravity: env.gravity,
@@ -107,7 +98,80 @@ impl ClothSystem {
             models,
             corner_offsets,
             corner_refs,
+            apart: None,
         })
+    }
+
+    /// Moves all models that resist bending into a system of their own, [`Self::apart`].
+    pub(crate) fn split_bending(&mut self) {
+        let (models, rest) = std::mem::take(&mut self.models).into_iter().partition(|m| m.bends());
+        self.models = rest;
+        (self.corner_offsets, self.corner_refs) = corners_by_vertex(&self.models, self.masses.len());
+        let (corner_offsets, corner_refs) = corners_by_vertex(&models, self.masses.len());
+        self.apart = Some(Box::new(Self {
+            masses: self.masses.clone(),
+            gravity: Vec3::zeros(),
+            wind: Vec3::zeros(),
+            air_damping: 0.0,
+            models,
+            corner_offsets,
+            corner_refs,
+            apart: None,
+        }));
+    }
+
+    /// What [`Self::split_bending`] took out.
+    pub(crate) fn apart(&self) -> Option<&Self> {
+        self.apart.as_deref()
+    }
+
+    /// All models: those stepped together, then those apart.
+    fn all_models(&self) -> impl Iterator<Item = &dyn ForceModel> {
+        self.models.iter().chain(self.apart.iter().flat_map(|apart| &apart.models)).map(AsRef::as_ref)
+    }
+
+    fn all_models_mut(&mut self) -> impl Iterator<Item = &mut Box<dyn ForceModel>> {
+        self.models.iter_mut().chain(self.apart.iter_mut().flat_map(|apart| &mut apart.models))
+    }
+
+    /// Whether any law remembers the path that led to a state.
+    pub fn remembers(&self) -> bool {
+        self.all_models().any(|m| !m.memory().is_empty())
+    }
+
+    /// What laws with memory remember of the path so far: with positions and velocities, the whole state. Empty where no
+    /// material asks for memory.
+    pub fn memory(&self) -> Vec<f64> {
+        self.all_models().flat_map(|m| m.memory()).copied().collect()
+    }
+
+    /// Puts back what [`Self::memory`] gave.
+    ///
+    /// # Errors
+    /// [`CoreError::Length`], [`CoreError::NotFinite`].
+    pub fn set_memory(&mut self, memory: &[f64]) -> Result<(), CoreError> {
+        let expected = self.all_models().map(|m| m.memory().len()).sum();
+        if memory.len() != expected {
+            return Err(CoreError::Length { name: "memory", expected, got: memory.len() });
+        }
+        if let Some(index) = memory.iter().position(|m| !m.is_finite()) {
+            return Err(CoreError::NotFinite { name: "memory", index, got: memory[index] });
+        }
+        let mut rest = memory;
+        for model in self.all_models_mut() {
+            let mine;
+            let to = model.memory_mut();
+            (mine, rest) = rest.split_at(to.len());
+            to.copy_from_slice(mine);
+        }
+        Ok(())
+    }
+
+    /// Takes the motion from the last accepted positions to `x` [m] as done: laws with memory move on. Call on the pool.
+    pub(crate) fn accept(&mut self, x: &[Vec3]) {
+        for model in self.all_models_mut() {
+            model.accept(x);
+        }
     }
 
     /// Number of cloth vertices.
@@ -123,7 +187,7 @@ impl ClothSystem {
     /// Energies of a state (positions [m], velocities [m/s]).
     pub fn energy(&self, x: &[Vec3], v: &[Vec3]) -> Energy {
         let mut energy = Energy::default();
-        for model in &self.models {
+        for model in self.all_models() {
             model.add_energy(0..model.count(), x, &mut energy);
         }
         for ((m, x), v) in self.masses.iter().zip(x).zip(v) {
@@ -137,11 +201,18 @@ impl ClothSystem {
     pub fn forces(&self, x: &[Vec3], v: &[Vec3], out: &mut [Vec3], pool: &rayon::ThreadPool) {
         let mut corners = Corners::new(&self.models);
         pool.install(|| self.evaluate(&mut corners, x, v, out));
+        if let Some(apart) = &self.apart {
+            let mut bending = vec![Vec3::zeros(); self.vertex_count()];
+            apart.forces(x, v, &mut bending, pool);
+            for (out, f) in out.iter_mut().zip(bending) {
+                *out += f;
+            }
+        }
     }
 
     /// What is built, in the order in which it is evaluated.
     pub fn effects(&self) -> Vec<EffectInfo> {
-        let mut effects: Vec<_> = self.models.iter().map(|m| m.info()).collect();
+        let mut effects: Vec<_> = self.all_models().map(ForceModel::info).collect();
         let elements = self.vertex_count();
         if self.gravity != Vec3::zeros() {
             effects.push(EffectInfo { name: "gravity", elements, bytes: 0 });
@@ -182,6 +253,11 @@ impl ClothSystem {
     /// Whether any force is not the gradient of [`Self::potential`].
     pub(crate) fn dissipates(&self) -> bool {
         self.models.iter().any(|m| m.dissipates())
+    }
+
+    /// How much stiffer than at rest the stiffest law may become on a path.
+    pub(crate) fn stiffening(&self) -> f64 {
+        self.models.iter().map(|m| m.stiffening()).fold(1.0, f64::max)
     }
 
     /// Forces with work space of the caller's. Call on the pool.
@@ -247,6 +323,24 @@ impl ClothSystem {
     }
 }
 
+/// For each vertex where its corners start, and the corners of all models, vertex by vertex.
+fn corners_by_vertex(models: &[Box<dyn ForceModel>], vertex_count: usize) -> (Vec<u32>, Vec<u32>) {
+    let mut offsets = vec![0u32; vertex_count + 1];
+    for &v in models.iter().flat_map(|m| m.vertices()) {
+        offsets[v as usize + 1] += 1;
+    }
+    for v in 0..vertex_count {
+        offsets[v + 1] += offsets[v];
+    }
+    let mut next = offsets.clone();
+    let mut refs = vec![0u32; offsets[vertex_count] as usize];
+    for (corner, &v) in models.iter().flat_map(|m| m.vertices()).enumerate() {
+        refs[next[v as usize] as usize] = corner as u32;
+        next[v as usize] += 1;
+    }
+    (offsets, refs)
+}
+
 impl ClothPart<'_> {
     fn check(&self, cloth_vertex_count: usize) -> Result<(), CoreError> {
         self.material.check()?;
@@ -307,6 +401,7 @@ impl ClothPart<'_> {
             Bending::None => false,
             Bending::Spring { stiffness, damping } => stiffness > 0.0 || damping > 0.0,
             Bending::Hinge { rigidity, .. } => rigidity > 0.0,
+            Bending::Nonlinear(_) | Bending::Plastic(_) | Bending::Hysteresis(_) => true,
         };
         if !bends {
             return Ok(());
@@ -334,12 +429,33 @@ impl ClothPart<'_> {
                 models.push(Box::new(Springs::new(Role::Bending, stiffness, damping, vertices, lengths)?));
             }
             Bending::Hinge { rigidity, damping } => {
-                let corners = |h: &crate::mesh::Hinge| [h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]];
-                let vertices = hinges.iter().map(|h| self.global(corners(h))).collect();
-                models.push(Box::new(Hinges::new(LinearLaw { rigidity, damping }, vertices, rest)?));
+                models.push(self.hinges(Linear::new(rigidity)?, damping * rigidity, rest)?);
+            }
+            Bending::Nonlinear(given) => {
+                let law = given.curve()?;
+                models.push(self.hinges(law, given.damping * law.b2(), rest)?);
+            }
+            Bending::Plastic(given) => {
+                models.push(self.hinges(given.law()?, given.damping * given.rigidity, rest)?);
+            }
+            Bending::Hysteresis(given) => {
+                let law = given.law()?;
+                models.push(self.hinges(law, given.damping * law.curve().b2(), rest)?);
             }
         }
         Ok(())
+    }
+
+    /// The hinges of the part under a law with the damping D [N m s].
+    fn hinges<L: BendingLaw + 'static>(
+        &self,
+        law: L,
+        damping: f64,
+        rest: Vec<Rest>,
+    ) -> Result<Box<dyn ForceModel>, CoreError> {
+        let corners = |h: &crate::mesh::Hinge| [h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]];
+        let vertices = self.topology.hinges.iter().map(|h| self.global(corners(h))).collect();
+        Ok(Box::new(Hinges::new(law, damping, vertices, rest)?))
     }
 
     /// Rest length of each edge: the mean over the triangles that have it, whose panels may differ at a seam [m].

@@ -4,7 +4,9 @@
 
 mod support;
 
-use cloth_core::{Environment, Integrator, Material, Method, Pins, Psd, SolverParams, StepError, mesh::Vec3};
+use cloth_core::{
+    Bending, Environment, Integrator, Material, Method, Pins, Psd, SolverParams, StepError, mesh::Vec3,
+};
 use support::{FREE, SOFT, SPRINGS, distance, integrator, params, sheet, system, undamped, wavy};
 
 const AIR: Environment = Environment {
@@ -68,11 +70,11 @@ fn coarsest(method: Method) -> usize {
     match method {
         Method::ExplicitEuler => 3200,
         Method::Rk4 => 100,
-        Method::Midpoint | Method::ImplicitEuler | Method::ImplicitNewton => 400,
+        Method::Midpoint | Method::ImplicitEuler | Method::ImplicitNewton | Method::SemiImplicit => 400,
     }
 }
 
-fn measured_order(method: Method, material: &Material, env: &Environment) -> f64 {
+fn measured_order(method: Method, sub_steps: usize, material: &Material, env: &Environment) -> f64 {
     const N: usize = 5;
     const DURATION: f64 = 0.4;
     let mesh = sheet(0.4, N);
@@ -82,6 +84,7 @@ fn measured_order(method: Method, material: &Material, env: &Environment) -> f64
     let mut params = params(method);
     params.solver.tolerance = 1e-11;
     params.newton_tolerance = 1e-10;
+    params.bending_substeps = sub_steps;
     params.psd = Psd::Raw;
     let mut integrator = integrator(system(&mesh, material, env), params);
     let steps = coarsest(method);
@@ -93,19 +96,21 @@ fn measured_order(method: Method, material: &Material, env: &Environment) -> f64
 }
 
 #[test]
-fn orders_of_convergence_are_1_2_4_1_and_1() {
+fn orders_of_convergence_are_1_2_4_and_1() {
     /// Distance of a measured order from its limit at these steps.
     const SLACK: f64 = 0.15;
     for material in [SOFT, SPRINGS] {
-        for (method, order) in [
-            (Method::ExplicitEuler, 1.0),
-            (Method::Midpoint, 2.0),
-            (Method::Rk4, 4.0),
-            (Method::ImplicitEuler, 1.0),
-            (Method::ImplicitNewton, 1.0),
+        for (method, sub_steps, order) in [
+            (Method::ExplicitEuler, 1, 1.0),
+            (Method::Midpoint, 1, 2.0),
+            (Method::Rk4, 1, 4.0),
+            (Method::ImplicitEuler, 1, 1.0),
+            (Method::ImplicitNewton, 1, 1.0),
+            (Method::SemiImplicit, 1, 1.0),
+            (Method::SemiImplicit, 3, 1.0),
         ] {
-            let got = measured_order(method, &material, &AIR);
-            println!("{method:?}: order {got:.3}");
+            let got = measured_order(method, sub_steps, &material, &AIR);
+            println!("{method:?}, {sub_steps} bending sub-steps: order {got:.3}");
             assert!((got - order).abs() < SLACK, "{method:?}: {got}");
         }
     }
@@ -151,13 +156,54 @@ fn explicit_steps_are_stable_below_the_estimate_and_diverge_above() {
 }
 
 #[test]
+fn bending_sub_steps_set_the_limit_of_the_semi_implicit_scheme() {
+    const DIVERGED: f64 = 1e3;
+    const STEPS: usize = 2000;
+    let still = Environment { gravity: Vec3::zeros(), ..Environment::default() };
+    let mesh = sheet(0.5, 7);
+    let stiff = Material { bending: Bending::Hinge { rigidity: 0.05, damping: 0.0 }, ..SOFT };
+    let mut limits = Vec::new();
+    for sub_steps in [1, 3] {
+        let mut params = params(Method::SemiImplicit);
+        params.bending_substeps = sub_steps;
+        params.solver.tolerance = 1e-10;
+        let mut integrator = integrator(system(&mesh, &stiff, &still), params);
+        let limit = integrator.stable_step(&mesh.vertices, &vec![Vec3::zeros(); mesh.vertices.len()]);
+        let mut growth = |factor: f64| {
+            let (mut x, mut v) = (mesh.vertices.clone(), vec![Vec3::zeros(); mesh.vertices.len()]);
+            for (i, v) in v.iter_mut().enumerate() {
+                *v = Vec3::y() * (if i % 2 == 0 { 1e-6 } else { -1e-6 } * (1.0 + (i % 5) as f64));
+            }
+            for _ in 0..STEPS {
+                if integrator.step(&mut x, &mut v, 0.0, factor * limit, &FREE).is_err() {
+                    return f64::INFINITY;
+                }
+            }
+            let size = v.iter().map(Vec3::norm).sum::<f64>() / (1e-6 * v.len() as f64);
+            if size.is_finite() { size } else { f64::INFINITY }
+        };
+        let (below, above) = (growth(0.9), growth(1.3));
+        println!("{sub_steps} sub-steps: limit {limit:.3e} s, growth {below:.2e} below, {above:.2e} above");
+        assert!(below < 10.0 && above > DIVERGED, "{sub_steps}: {below:e} {above:e}");
+        limits.push(limit);
+    }
+    assert!((limits[1] / limits[0] - 3.0).abs() < 1e-6, "{limits:?}");
+}
+
+#[test]
 fn momentum_is_kept_without_gravity_and_air() {
     /// Relative change: rounding for explicit schemes, the linear solver's tolerance for implicit ones.
     const EXPLICIT: f64 = 1e-11;
     const IMPLICIT: f64 = 1e-8;
     let still = Environment { gravity: Vec3::zeros(), ..Environment::default() };
     for material in [SOFT, SPRINGS] {
-        for method in [Method::ExplicitEuler, Method::Rk4, Method::ImplicitEuler, Method::ImplicitNewton] {
+        for method in [
+            Method::ExplicitEuler,
+            Method::Rk4,
+            Method::ImplicitEuler,
+            Method::ImplicitNewton,
+            Method::SemiImplicit,
+        ] {
             let mesh = sheet(0.4, 8);
             let (mut x, mut v) = wavy(&mesh, 0.03, 0.5);
             let mut params = params(method);
@@ -197,6 +243,7 @@ fn free_fall_follows_the_scheme() {
         (Method::Rk4, 50.0),
         (Method::ImplicitEuler, 55.0),
         (Method::ImplicitNewton, 55.0),
+        (Method::SemiImplicit, 55.0),
     ] {
         let (mut x, mut v) = (mesh.vertices.clone(), vec![Vec3::zeros(); mesh.vertices.len()]);
         let mut params = params(method);
@@ -217,9 +264,14 @@ fn free_fall_follows_the_scheme() {
 fn pins_end_at_their_targets_and_implicit_steps_are_position_consistent() {
     let mesh = sheet(0.5, 6);
     let dt = 2e-3;
-    for method in
-        [Method::ExplicitEuler, Method::Midpoint, Method::Rk4, Method::ImplicitEuler, Method::ImplicitNewton]
-    {
+    for method in [
+        Method::ExplicitEuler,
+        Method::Midpoint,
+        Method::Rk4,
+        Method::ImplicitEuler,
+        Method::ImplicitNewton,
+        Method::SemiImplicit,
+    ] {
         let (x0, v0) = wavy(&mesh, 0.02, 0.3);
         let (mut x, mut v) = (x0.clone(), v0.clone());
         x.push(Vec3::new(7.0, 7.0, 7.0)); // a collider's vertex: not touched

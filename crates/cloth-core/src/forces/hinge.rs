@@ -8,6 +8,8 @@
 //! [m]; M(K) the moment per width [N] of a [`BendingLaw`]. The linear law M = B K with the rigidity B [N m] has
 //! E = |e| B (θ − θ_0)²/(2 h̄) and makes B the rigidity that a textile laboratory measures.
 //!
+//! Angles of laws with memory go on past ±π: of the angles that differ by 2π, the one next to what is remembered counts.
+//!
 //! Torque |e| M, force −|e| M dθ/dx with the exact gradient (t_i = l_i·e/|e|²):
 //! dθ/dx_2 = −|e| n_0/|n_0|², dθ/dx_3 = −|e| n_1/|n_1|², dθ/dx_0 = −(1 − t_0) dθ/dx_2 − (1 − t_1) dθ/dx_3,
 //! dθ/dx_1 = −t_0 dθ/dx_2 − t_1 dθ/dx_3: forces and moments sum to zero.
@@ -19,64 +21,30 @@
 //!
 //! Sources: thesis (3.9), (3.28), (3.29) with atan2 and mesh-independent weights; Pabst et al. 2008 for K.
 
-use std::ops::Range;
+use std::{f64::consts::PI, ops::Range};
 
-use super::{CouplingKind, Couplings, ForceModel, Linear, Psd, corner_pairs};
-use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
+use rayon::prelude::*;
+
+use super::{CouplingKind, Couplings, ForceModel, Psd, corner_pairs};
+use crate::{
+    CoreError, EffectInfo, Energy,
+    assembly::ELEMENTS_PER_CHUNK,
+    bending::{BendingLaw, words},
+    mesh::Vec3,
+};
 
 /// Area relative to rest under which a triangle's normal no longer gives a full gradient.
 const COLLAPSED: f64 = 1e-4;
 
-/// What a law answers at one curvature.
-#[allow(clippy::struct_field_names, reason = "the moment of a moment–curvature law is its moment")]
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Moment {
-    /// M: moment per width [N].
-    pub(crate) moment: f64,
-    /// dM/dK [N m].
-    pub(crate) slope: f64,
-    /// Ψ: stored energy per area, up to the law's definition of what is stored [J/m²].
-    pub(crate) energy: f64,
-}
-
-/// A moment–curvature law of one material. Kernels are compiled once per law.
-pub(crate) trait BendingLaw: Send + Sync {
-    /// Name of the effect.
-    const NAME: &'static str;
-    /// Moment, slope and energy of hinge `element` at `curvature` [1/m].
-    fn moment(&self, element: usize, curvature: f64) -> Moment;
-    /// Damping moment per width and rate of curvature [N m s].
-    fn damping(&self) -> f64;
-}
-
-/// M = B K.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LinearLaw {
-    /// B [N m].
-    pub(crate) rigidity: f64,
-    /// Damping time [s].
-    pub(crate) damping: f64,
-}
-
-impl BendingLaw for LinearLaw {
-    const NAME: &'static str = "hinge";
-
-    #[inline]
-    fn moment(&self, _element: usize, curvature: f64) -> Moment {
-        let moment = self.rigidity * curvature;
-        Moment { moment, slope: self.rigidity, energy: 0.5 * moment * curvature }
-    }
-
-    fn damping(&self) -> f64 {
-        self.damping * self.rigidity
-    }
-}
-
 /// Hinges with one law.
-pub(crate) struct Hinges<L> {
+pub(crate) struct Hinges<L: BendingLaw> {
     law: L,
+    /// D: damping moment per width and rate of curvature [N m s].
+    damping: f64,
     vertices: Vec<[u32; 4]>,
     rest: Vec<Rest>,
+    /// What each hinge remembers; no memory for laws without.
+    memory: Vec<L::Memory>,
 }
 
 /// Rest data of one hinge.
@@ -116,11 +84,16 @@ pub(crate) fn dihedral_angle(x: &[Vec3; 4]) -> f64 {
 }
 
 impl<L: BendingLaw> Hinges<L> {
-    /// Hinges over global `vertices` (e0, e1, opposite, opposite) with their rest data.
+    /// Hinges over global `vertices` (e0, e1, opposite, opposite) with their rest data; `damping` D [N m s].
     ///
     /// # Errors
     /// [`CoreError::Degenerate`] for a hinge whose edge or height is not positive.
-    pub(crate) fn new(law: L, vertices: Vec<[u32; 4]>, rest: Vec<Rest>) -> Result<Self, CoreError> {
+    pub(crate) fn new(
+        law: L,
+        damping: f64,
+        vertices: Vec<[u32; 4]>,
+        rest: Vec<Rest>,
+    ) -> Result<Self, CoreError> {
         for (element, r) in rest.iter().enumerate() {
             for (measure, got) in [("rest edge in m", r.edge), ("rest height in m", r.height)] {
                 if !(got.is_finite() && got > 0.0) {
@@ -129,7 +102,21 @@ impl<L: BendingLaw> Hinges<L> {
                 }
             }
         }
-        Ok(Self { law, vertices, rest })
+        let memory = vec![L::Memory::default(); vertices.len()];
+        Ok(Self { law, damping, vertices, rest, memory })
+    }
+
+    /// Change of curvature of a hinge whose angle is `angle` ∈ [−π, π].
+    #[inline]
+    fn curvature(rest: &Rest, memory: &L::Memory, angle: f64) -> f64 {
+        let curvature = (angle - rest.angle) / rest.height;
+        match L::last(memory) {
+            Some(last) if (last - curvature).abs() * rest.height > PI => {
+                let turn = 2.0 * PI / rest.height;
+                curvature + turn * ((last - curvature) / turn).round()
+            }
+            _ => curvature,
+        }
     }
 
     #[inline]
@@ -184,7 +171,9 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         EffectInfo {
             name: L::NAME,
             elements: self.vertices.len(),
-            bytes: size_of_val(self.vertices.as_slice()) + size_of_val(self.rest.as_slice()),
+            bytes: size_of_val(self.vertices.as_slice())
+                + size_of_val(self.rest.as_slice())
+                + size_of_val(self.memory.as_slice()),
         }
     }
 
@@ -203,28 +192,57 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         }
     }
 
+    fn bends(&self) -> bool {
+        true
+    }
+
     fn dissipates(&self) -> bool {
-        self.law.damping() > 0.0
+        self.damping > 0.0 || !L::CONSERVATIVE
+    }
+
+    fn stiffening(&self) -> f64 {
+        self.law.stiffening()
+    }
+
+    fn accept(&mut self, x: &[Vec3]) {
+        if words::<L>() == 0 {
+            return;
+        }
+        let Self { law, vertices, rest, memory, .. } = self;
+        memory.par_chunks_mut(ELEMENTS_PER_CHUNK).enumerate().for_each(|(chunk, memory)| {
+            for (element, memory) in (chunk * ELEMENTS_PER_CHUNK..).zip(memory) {
+                let angle = dihedral_angle(&vertices[element].map(|i| x[i as usize]));
+                law.advance(memory, Self::curvature(&rest[element], memory, angle));
+            }
+        });
+    }
+
+    fn memory(&self) -> &[f64] {
+        if words::<L>() == 0 { &[] } else { bytemuck::cast_slice(&self.memory) }
+    }
+
+    fn memory_mut(&mut self) -> &mut [f64] {
+        if words::<L>() == 0 { &mut [] } else { bytemuck::cast_slice_mut(&mut self.memory) }
     }
 
     fn add_energy(&self, range: Range<usize>, x: &[Vec3], energy: &mut Energy) {
         for element in range {
             let rest = &self.rest[element];
-            let curvature = (dihedral_angle(&self.corners_of(element, x)) - rest.angle) / rest.height;
-            energy.bending += rest.edge * rest.height * self.law.moment(element, curvature).energy;
+            let memory = &self.memory[element];
+            let curvature = Self::curvature(rest, memory, dihedral_angle(&self.corners_of(element, x)));
+            energy.bending += rest.edge * rest.height * self.law.moment(memory, curvature, 0.0).energy;
         }
     }
 
     fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
-        let damping = self.law.damping();
         for (element, f) in range.zip(out.chunks_exact_mut(4)) {
-            let rest = &self.rest[element];
+            let (rest, memory) = (&self.rest[element], &self.memory[element]);
             let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
-            let curvature = (value - rest.angle) / rest.height;
-            let mut torque = rest.edge * self.law.moment(element, curvature).moment;
-            if damping > 0.0 {
+            let curvature = Self::curvature(rest, memory, value);
+            let mut torque = rest.edge * self.law.moment(memory, curvature, 0.0).moment;
+            if self.damping > 0.0 {
                 let rate: f64 = (0..4).map(|c| gradient[c].dot(&v[self.vertices[element][c] as usize])).sum();
-                torque += rest.edge * damping / rest.height * rate;
+                torque += rest.edge * self.damping / rest.height * rate;
             }
             for c in 0..4 {
                 f[c] = gradient[c] * -torque;
@@ -237,23 +255,23 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         range: Range<usize>,
         x: &[Vec3],
         v: &[Vec3],
-        linear: &Linear,
+        linear: &super::Linear,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {
-        let damping = self.law.damping();
+        let damping = self.damping;
         let first = range.start;
         match couplings {
             Couplings::Outer(outer) => {
                 for ((element, f), outer) in range.zip(forces.chunks_exact_mut(4)).zip(outer) {
-                    let rest = &self.rest[element];
+                    let (rest, memory) = (&self.rest[element], &self.memory[element]);
                     let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
                     let [v0, v1, v2, v3] = self.corners_of(element, v);
                     // Σ g_a = 0, so the rate needs differences only.
                     let rate = gradient[1].dot(&(v1 - v0))
                         + gradient[2].dot(&(v2 - v0))
                         + gradient[3].dot(&(v3 - v0));
-                    let answer = self.law.moment(element, (value - rest.angle) / rest.height);
+                    let answer = self.law.moment(memory, Self::curvature(rest, memory, value), rate);
                     let per_angle = rest.edge / rest.height;
                     // A negative slope has no place in a positive semi-definite block.
                     let stiffness = per_angle * answer.slope.max(0.0);
@@ -270,12 +288,12 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                 for ((element, f), blocks) in
                     range.zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
                 {
-                    let rest = &self.rest[element];
+                    let (rest, memory) = (&self.rest[element], &self.memory[element]);
                     let corners = self.corners_of(element, x);
                     let velocity = self.corners_of(element, v);
                     let Angle { value, gradient } = Self::angle(rest, &corners);
                     let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
-                    let answer = self.law.moment(element, (value - rest.angle) / rest.height);
+                    let answer = self.law.moment(memory, Self::curvature(rest, memory, value), rate);
                     let per_angle = rest.edge / rest.height;
                     let (stiffness, damping) = (per_angle * answer.slope, per_angle * damping);
                     let moment = rest.edge * answer.moment;
@@ -309,13 +327,16 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
 #[cfg(test)]
 mod tests {
     use super::super::testing::{
-        Model, Random, check_derivatives, check_momentum, check_rigid_motion, check_velocity_terms, energy,
-        forces,
+        Model, Random, check_blocks, check_derivatives, check_momentum, check_rigid_motion,
+        check_velocity_terms, energy, forces,
     };
     use super::*;
+    use crate::bending::{Curve, Hysteresis, Linear, Plastic};
 
-    const LAW: LinearLaw = LinearLaw { rigidity: 2.0, damping: 0.0 };
-    const DAMPED: LinearLaw = LinearLaw { rigidity: 2.0, damping: 0.3 };
+    /// B [N m].
+    const RIGIDITY: f64 = 2.0;
+    /// D of the damped hinge [N m s].
+    const DAMPING: f64 = 0.6;
 
     /// A hinge on the x axis with flaps of the given heights, the second folded by θ about the edge.
     fn folded(theta: f64, heights: [f64; 2]) -> [Vec3; 4] {
@@ -328,9 +349,13 @@ mod tests {
         ]
     }
 
-    fn hinge(law: LinearLaw, heights: [f64; 2], rest_angle: f64) -> Model {
+    fn bent<L: BendingLaw + 'static>(law: L, damping: f64, heights: [f64; 2], rest_angle: f64) -> Model {
         let rest = Rest::new(1.0, heights.map(|h| 0.5 * h), rest_angle);
-        Box::new(Hinges::new(law, vec![[0, 1, 2, 3]], vec![rest]).unwrap())
+        Box::new(Hinges::new(law, damping, vec![[0, 1, 2, 3]], vec![rest]).unwrap())
+    }
+
+    fn hinge(damping: f64, heights: [f64; 2], rest_angle: f64) -> Model {
+        bent(Linear::new(RIGIDITY).unwrap(), damping, heights, rest_angle)
     }
 
     #[test]
@@ -361,10 +386,10 @@ mod tests {
                 let noise = 0.02 * f64::min(heights[0], heights[1]);
                 let x = folded(theta, heights).map(|x| x + random.vector() * noise);
                 let v = random.vectors(4, 1.0);
-                check_derivatives(&hinge(LAW, heights, 0.2), &x, what);
-                check_velocity_terms(&hinge(DAMPED, heights, 0.2), &x, &v, what);
-                check_momentum(&hinge(DAMPED, heights, 0.2), &x, &v, what);
-                check_rigid_motion(&hinge(DAMPED, heights, 0.2), &x, what);
+                check_derivatives(&hinge(0.0, heights, 0.2), &x, what);
+                check_velocity_terms(&hinge(DAMPING, heights, 0.2), &x, &v, what);
+                check_momentum(&hinge(DAMPING, heights, 0.2), &x, &v, what);
+                check_rigid_motion(&hinge(DAMPING, heights, 0.2), &x, what);
             }
         }
     }
@@ -373,7 +398,7 @@ mod tests {
     fn rest_has_no_energy_and_no_force() {
         for theta in [0.0, 0.7, -2.5] {
             let x = folded(theta, [1.0, 0.7]);
-            let model = hinge(LAW, [1.0, 0.7], dihedral_angle(&x));
+            let model = hinge(0.0, [1.0, 0.7], dihedral_angle(&x));
             assert_eq!(energy(&model, &x), 0.0);
             assert!(forces(&model, &x, &[Vec3::zeros(); 4]).iter().all(|f| *f == Vec3::zeros()));
         }
@@ -384,7 +409,7 @@ mod tests {
         // |e| = 1, heights 1 and 0.6, h̄ = 0.8, θ = 0.4, B = 2: K = 0.5, M = 1, energy |e| B θ²/(2 h̄) = 0.2.
         // Torque |e| M = 1 on each flap: force torque/height = 1 on vertex 2 along its normal (0, 0, 1).
         let x = folded(0.4, [1.0, 0.6]);
-        let model = hinge(LAW, [1.0, 0.6], 0.0);
+        let model = hinge(0.0, [1.0, 0.6], 0.0);
         assert!((energy(&model, &x) - 0.2).abs() < 1e-14);
         let f = forces(&model, &x, &[Vec3::zeros(); 4]);
         assert!((f[2] - Vec3::z()).norm() < 1e-13, "{:?}", f[2]);
@@ -396,15 +421,96 @@ mod tests {
 
     #[test]
     fn collapsed_hinges_stay_finite_and_bad_ones_are_named() {
-        let model = hinge(DAMPED, [1.0, 1.0], 0.0);
+        let model = hinge(DAMPING, [1.0, 1.0], 0.0);
         for x in [[Vec3::zeros(); 4], [Vec3::zeros(), Vec3::x(), Vec3::x() * 0.4, Vec3::x() * 0.2]] {
             let f = forces(&model, &x, &[Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()]);
             assert!(f.iter().all(|f| f.iter().all(|c| c.is_finite())), "{f:?}");
         }
         let rest = vec![Rest::new(1.0, [1.0, 1.0], 0.0), Rest::new(1.0, [0.0, 0.0], 0.0)];
-        let error = Hinges::new(LAW, vec![[0, 1, 2, 3], [4, 5, 6, 7]], rest).err();
+        let error =
+            Hinges::new(Linear::new(RIGIDITY).unwrap(), 0.0, vec![[0, 1, 2, 3], [4, 5, 6, 7]], rest).err();
         assert!(
             matches!(error, Some(CoreError::Degenerate { element: 1, ref vertices, .. }) if vertices == &[4, 5, 6, 7])
         );
+    }
+
+    /// Laws of every kind, the ones with memory in the middle of a path.
+    fn laws_on_the_way(heights: [f64; 2], start: &[Vec3]) -> Vec<(&'static str, Model)> {
+        let curve = Curve::new(3.0, 1.0, -2.0).unwrap();
+        let mut laws = vec![
+            ("nonlinear", bent(curve, 0.0, heights, 0.2)),
+            ("plastic", bent(Plastic::new(2.0, 0.3, 0.5).unwrap(), 0.0, heights, 0.2)),
+            ("hysteresis", bent(Hysteresis::new(curve, 0.2, 0.1).unwrap(), 0.0, heights, 0.2)),
+            ("hysteresis, damped", bent(Hysteresis::new(curve, 0.2, 0.1).unwrap(), DAMPING, heights, 0.2)),
+        ];
+        for (_, model) in &mut laws {
+            for theta in [1.4, -0.3, 0.9, 0.5] {
+                model.accept(&folded(theta, heights));
+            }
+            model.accept(start);
+        }
+        laws
+    }
+
+    #[test]
+    fn blocks_and_momentum_of_laws_with_memory() {
+        let mut random = Random::new(9);
+        let heights = [1.0, 0.8];
+        for theta in [0.3, 0.7, 1.5, -2.0, 3.0] {
+            for (what, model) in laws_on_the_way(heights, &folded(0.45, heights)) {
+                let x = folded(theta, heights).map(|x| x + random.vector() * 0.02);
+                let v = random.vectors(4, 1.0);
+                check_blocks(&model, &x, what);
+                check_momentum(&model, &x, &v, what);
+                check_rigid_motion(&model, &x, what);
+            }
+        }
+    }
+
+    #[test]
+    fn memory_moves_on_by_accepting_only_and_can_be_put_back() {
+        let heights = [1.0, 0.8];
+        let (start, bent) = (folded(0.45, heights), folded(1.2, heights));
+        for (what, mut model) in laws_on_the_way(heights, &start) {
+            let (memory, rest) = (model.memory().to_vec(), [Vec3::zeros(); 4]);
+            let before = forces(&model, &start, &rest);
+            forces(&model, &bent, &rest);
+            assert_eq!(model.memory(), memory, "{what}");
+            model.accept(&bent);
+            assert_eq!(model.memory() == memory, memory.is_empty(), "{what}");
+            assert_eq!(forces(&model, &start, &rest) == before, what == "nonlinear", "{what}");
+            model.memory_mut().copy_from_slice(&memory);
+            assert_eq!(forces(&model, &start, &rest), before, "{what}");
+        }
+    }
+
+    #[test]
+    fn a_hinge_that_folds_through_goes_on_past_pi() {
+        use std::f64::consts::PI;
+        let heights = [1.0, 1.0];
+        let law = Hysteresis::new(Curve::new(3.0, 1.0, -2.0).unwrap(), 0.0, 0.0).unwrap();
+        let mut model = bent(law, 0.0, heights, 0.0);
+        let mut last = 0.0;
+        for step in 0..=160 {
+            let x = folded(0.04 * f64::from(step), heights);
+            model.accept(&x);
+            let now = energy(&model, &x);
+            assert!(now > last || step == 0, "{step}: {last} {now}");
+            last = now;
+        }
+        // θ = 6.4 > 2π.
+        assert!(last > 0.5 * (2.0 * PI).powi(2), "{last}");
+        let f = forces(&model, &folded(PI, heights), &[Vec3::zeros(); 4]);
+        assert!(f.iter().flatten().all(|c| c.is_finite()));
+    }
+
+    #[test]
+    fn memory_costs_48_bytes_where_it_is_and_none_elsewhere() {
+        let bytes = |model: &Model| model.info().bytes;
+        let curve = Curve::new(3.0, 1.0, -2.0).unwrap();
+        let linear = bytes(&hinge(0.0, [1.0; 2], 0.0));
+        assert_eq!(bytes(&bent(curve, 0.0, [1.0; 2], 0.0)), linear);
+        let hysteresis = Hysteresis::new(curve, 0.5, 0.5).unwrap();
+        assert_eq!(bytes(&bent(hysteresis, 0.0, [1.0; 2], 0.0)), linear + 48);
     }
 }

@@ -117,6 +117,29 @@ pub(crate) trait ForceModel: Send + Sync {
     /// Whether it dissipates: its force is then not the gradient of an energy.
     fn dissipates(&self) -> bool;
 
+    /// Whether it resists bending.
+    fn bends(&self) -> bool {
+        false
+    }
+
+    /// How much stiffer than at rest it may become on a path.
+    fn stiffening(&self) -> f64 {
+        1.0
+    }
+
+    /// Takes a motion to `x` as done: what elements remember moves on. Nothing else changes it. Call on the pool.
+    fn accept(&mut self, _x: &[Vec3]) {}
+
+    /// What the elements remember, as a checkpoint holds it; empty for laws without memory.
+    fn memory(&self) -> &[f64] {
+        &[]
+    }
+
+    /// As [`Self::memory`], to be written by one who resumes.
+    fn memory_mut(&mut self) -> &mut [f64] {
+        &mut []
+    }
+
     /// Number of elements.
     fn count(&self) -> usize {
         self.vertices().len() / self.corners()

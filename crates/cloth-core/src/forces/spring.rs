@@ -109,6 +109,10 @@ impl ForceModel for Springs {
         CouplingKind::Blocks
     }
 
+    fn bends(&self) -> bool {
+        self.role == Role::Bending
+    }
+
     fn dissipates(&self) -> bool {
         self.damping > 0.0
     }

@@ -154,7 +154,7 @@ fn blocks_by_differences(model: &Model, x: &[Vec3], v: &[Vec3], velocity: bool) 
     out
 }
 
-/// Force against energy and blocks against force, with a planted fault; symmetry; no negative eigenvalue when projected.
+/// Force against energy, with a planted fault, and [`check_blocks`].
 pub(crate) fn check_derivatives(model: &Model, x: &[Vec3], what: &str) {
     let rest = vec![Vec3::zeros(); x.len()];
     let f = flat(&forces(model, x, &rest));
@@ -164,6 +164,12 @@ pub(crate) fn check_derivatives(model: &Model, x: &[Vec3], what: &str) {
     faulty[f.iamax()] *= 1.0 + FAULT;
     assert!(error(&faulty, &expected) > TOLERANCE, "{what}: a fault in the force must be seen");
 
+    check_blocks(model, x, what);
+}
+
+/// Blocks against force, with a planted fault; symmetry; no negative eigenvalue when projected.
+pub(crate) fn check_blocks(model: &Model, x: &[Vec3], what: &str) {
+    let rest = vec![Vec3::zeros(); x.len()];
     let (_, k) = linearised(model, x, &rest, &ELASTIC);
     let expected = blocks_by_differences(model, x, &rest, false);
     assert!(matrix_error(&k, &expected) < TOLERANCE, "{what}: blocks {:e}", matrix_error(&k, &expected));

@@ -5,6 +5,7 @@ mod implicit;
 mod implicit_euler;
 mod line_search;
 mod newton;
+mod semi_implicit;
 mod stability;
 
 use std::sync::Arc;
@@ -28,12 +29,19 @@ pub enum Method {
     ImplicitEuler,
     /// Backward Euler solved to a tolerance by Newton's method with a line search. Order 1.
     ImplicitNewton,
+    /// Bending explicitly in sub-steps, everything else by one linearised backward Euler step (thesis 4.3). Order 1.
+    SemiImplicit,
 }
 
 impl Method {
-    /// Whether the scheme is explicit, so that its step is limited by stability.
+    /// Whether all of the scheme is explicit: it solves no linear system.
     pub fn is_explicit(self) -> bool {
         matches!(self, Self::ExplicitEuler | Self::Midpoint | Self::Rk4)
+    }
+
+    /// Whether any of the scheme is explicit, so that its step is limited by stability.
+    pub fn has_stability_limit(self) -> bool {
+        self.is_explicit() || self == Self::SemiImplicit
     }
 }
 
@@ -53,6 +61,8 @@ pub struct IntegratorParams {
     pub newton_max_iterations: usize,
     /// Step halvings of one line search.
     pub line_search_max_halvings: usize,
+    /// α: explicit sub-steps for bending in one step of the semi-implicit scheme.
+    pub bending_substeps: usize,
 }
 
 impl Default for IntegratorParams {
@@ -64,6 +74,7 @@ impl Default for IntegratorParams {
             newton_tolerance: 1e-6,
             newton_max_iterations: 50,
             line_search_max_halvings: 20,
+            bending_substeps: 1,
         }
     }
 }
@@ -99,7 +110,8 @@ pub struct StepInfo {
     pub forces: Vec<(&'static str, f64)>,
 }
 
-/// Advances the state of a [`ClothSystem`]. Holds work space only: a step depends on its arguments alone.
+/// Advances the state of a [`ClothSystem`]. A step depends on its arguments and on what laws with memory remember,
+/// which only [`Integrator::accept`] moves.
 pub struct Integrator {
     system: ClothSystem,
     params: IntegratorParams,
@@ -113,6 +125,7 @@ pub struct Integrator {
 enum Work {
     Explicit(explicit::Buffers),
     Implicit(Box<implicit::Workspace>),
+    SemiImplicit(Box<(semi_implicit::SubSteps, implicit::Workspace)>),
 }
 
 impl Integrator {
@@ -121,7 +134,7 @@ impl Integrator {
     /// # Errors
     /// [`CoreError::Parameter`] for a tolerance that is not positive or a cap of zero.
     pub fn new(
-        system: ClothSystem,
+        mut system: ClothSystem,
         params: IntegratorParams,
         pool: Arc<rayon::ThreadPool>,
     ) -> Result<Self, CoreError> {
@@ -135,15 +148,25 @@ impl Integrator {
         for (name, got) in [
             ("solver.max_iterations", params.solver.max_iterations),
             ("newton_max_iterations", params.newton_max_iterations),
+            ("bending_substeps", params.bending_substeps),
         ] {
             if got == 0 {
                 return Err(CoreError::Parameter { name, expected: "a count ≥ 1", got: 0.0 });
             }
         }
+        if params.method == Method::SemiImplicit {
+            system.split_bending();
+        }
         let work = if params.method.is_explicit() {
             Work::Explicit(explicit::Buffers::new(&system))
         } else {
-            Work::Implicit(Box::new(implicit::Workspace::new(&system, &params)))
+            let implicit = implicit::Workspace::new(&system, &params);
+            match system.apart() {
+                Some(bending) => {
+                    Work::SemiImplicit(Box::new((semi_implicit::SubSteps::new(bending), implicit)))
+                }
+                None => Work::Implicit(Box::new(implicit)),
+            }
         };
         let pinned = vec![false; system.vertex_count()];
         Ok(Self { system, params, pool, pinned, work })
@@ -164,6 +187,7 @@ impl Integrator {
         match &self.work {
             Work::Explicit(buffers) => buffers.bytes(),
             Work::Implicit(work) => work.bytes(),
+            Work::SemiImplicit(work) => work.0.bytes() + work.1.bytes(),
         }
     }
 
@@ -211,6 +235,10 @@ impl Integrator {
                     implicit_euler::step(work, system, params, x, v, dt, &pins)
                 }
             }
+            Work::SemiImplicit(work) => {
+                let (sub_steps, work) = &mut **work;
+                sub_steps.step(work, system, params, x, v, dt, &Prescribed { pins, pinned })
+            }
         });
         for &vertex in pins.vertices {
             self.pinned[vertex as usize] = false;
@@ -218,16 +246,36 @@ impl Integrator {
         result
     }
 
-    /// Estimate of the largest stable step of the explicit scheme at a state [s]; infinite for implicit schemes.
+    /// Takes the motion to `x` [m] as done: laws with memory move on. Once per accepted step; without it a step, a retry
+    /// or a response leaves no trace.
+    pub fn accept(&mut self, x: &[Vec3]) {
+        if self.system.remembers() {
+            let Self { system, pool, .. } = self;
+            pool.install(|| system.accept(x));
+        }
+    }
+
+    /// Puts back what [`ClothSystem::memory`] gave.
+    ///
+    /// # Errors
+    /// As [`ClothSystem::set_memory`].
+    pub fn set_memory(&mut self, memory: &[f64]) -> Result<(), CoreError> {
+        self.system.set_memory(memory)
+    }
+
+    /// Estimate of the largest stable step of the explicit part of a scheme at a state [s]; infinite for schemes without.
     ///
     /// The largest vibration modes of the linearised system come from a Lanczos iteration; the estimate is the largest
     /// step at which none of them grows, or grows by less than a factor e per second: without damping, explicit Euler
     /// and midpoint amplify every mode a little at any step.
     pub fn stable_step(&self, x: &[Vec3], v: &[Vec3]) -> f64 {
-        if !self.params.method.is_explicit() {
+        let method = self.params.method;
+        if !method.has_stability_limit() {
             return f64::INFINITY;
         }
-        self.pool.install(|| stability::stable_step(&self.system, self.params.method, x, v))
+        let system = self.system.apart().unwrap_or(&self.system);
+        let sub_steps = if method == Method::SemiImplicit { self.params.bending_substeps } else { 1 };
+        sub_steps as f64 * self.pool.install(|| stability::stable_step(system, method, x, v))
     }
 }
 

@@ -1,6 +1,9 @@
 //! What cloth is made of, in SI units.
 
+mod bending;
 pub mod library;
+
+pub use bending::{Bending, HysteresisBending, NonlinearBending, PlasticBending};
 
 use crate::CoreError;
 
@@ -43,34 +46,6 @@ pub enum InPlane {
     },
 }
 
-/// Out-of-plane law.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
-#[serde(tag = "model", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Bending {
-    /// No resistance to bending.
-    #[default]
-    None,
-    /// Linear springs between the vertices opposite each shared edge, damped along their axis.
-    #[serde(rename = "bending-spring", alias = "spring")]
-    Spring {
-        /// Stiffness of each spring [N/m].
-        stiffness: f64,
-        /// Damping of each spring [N s/m].
-        #[serde(default)]
-        damping: f64,
-    },
-    /// Moment per width proportional to the change of curvature across each shared edge.
-    Hinge {
-        /// Bending rigidity per width [N m].
-        rigidity: f64,
-        /// Damping time [s]: the damping moment is this times the rigidity times the rate of curvature.
-        #[serde(default)]
-        damping: f64,
-    },
-}
-
 impl Material {
     /// Refuses values that are not finite, a density that is not positive, and negative stiffness or damping.
     ///
@@ -87,12 +62,6 @@ impl Material {
                 got: self.areal_density,
             });
         }
-        let not_negative = |values: &[(&'static str, &'static str, f64)]| {
-            values
-                .iter()
-                .find(|(_, _, got)| !(got.is_finite() && *got >= 0.0))
-                .map_or(Ok(()), |&(name, expected, got)| Err(CoreError::Parameter { name, expected, got }))
-        };
         match self.in_plane {
             InPlane::Spring { stiffness, damping } => not_negative(&[
                 ("in_plane.stiffness", STIFFNESS, stiffness),
@@ -105,16 +74,14 @@ impl Material {
                 ("in_plane.damping", TIME, damping),
             ])?,
         }
-        match self.bending {
-            Bending::None => Ok(()),
-            Bending::Spring { stiffness, damping } => not_negative(&[
-                ("bending.stiffness", STIFFNESS, stiffness),
-                ("bending.damping", AXIAL, damping),
-            ]),
-            Bending::Hinge { rigidity, damping } => not_negative(&[
-                ("bending.rigidity", "a value ≥ 0 in N m", rigidity),
-                ("bending.damping", TIME, damping),
-            ]),
-        }
+        self.bending.check()
     }
+}
+
+/// Refuses the first of some (name, expectation, value) that is negative or not finite.
+fn not_negative(values: &[(&'static str, &'static str, f64)]) -> Result<(), CoreError> {
+    values
+        .iter()
+        .find(|(_, _, got)| !(got.is_finite() && *got >= 0.0))
+        .map_or(Ok(()), |&(name, expected, got)| Err(CoreError::Parameter { name, expected, got }))
 }

@@ -49,6 +49,9 @@ pub(crate) fn undamped(material: &Material) -> Material {
     match &mut material.bending {
         Bending::None => {}
         Bending::Spring { damping, .. } | Bending::Hinge { damping, .. } => *damping = 0.0,
+        Bending::Nonlinear(law) => law.damping = 0.0,
+        Bending::Plastic(law) => law.damping = 0.0,
+        Bending::Hysteresis(law) => law.damping = 0.0,
     }
     material
 }

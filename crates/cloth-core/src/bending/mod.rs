@@ -1,0 +1,132 @@
+//! Moment per width M [N] of a fabric over its curvature K [1/m], by law, and what a bent place remembers.
+//!
+//! | law | moment | remembers |
+//! |---|---|---|
+//! | [`Linear`] | B K | nothing |
+//! | [`Curve`] (nonlinear) | softening from b_1 to b_2 (4.2) | nothing |
+//! | [`Plastic`] | B (K − K_p) up to an elastic limit, then flow | K_p |
+//! | [`Hysteresis`] | the loop of (4.4)–(4.8), residual curvature, fatigue | its place in the loop |
+//!
+//! K is the change of curvature against the mesh at rest, (θ − θ_0)/h̄ of a hinge. [`trace`] follows a law alone along
+//! any path; hinges of a simulation follow the same code.
+
+mod curve;
+mod hysteresis;
+mod plastic;
+mod trace;
+
+use crate::CoreError;
+pub use curve::Curve;
+pub use hysteresis::{Hysteresis, Loop};
+pub use plastic::{Flow, Plastic};
+pub use trace::{Law, Trace, trace};
+
+/// What a law answers at one curvature.
+#[allow(clippy::struct_field_names, reason = "the moment of a moment–curvature law is its moment")]
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Moment {
+    /// M: moment per width [N].
+    pub(crate) moment: f64,
+    /// dM/dK in the direction of motion [N m].
+    pub(crate) slope: f64,
+    /// Ψ: stored energy per area [J/m²].
+    pub(crate) energy: f64,
+}
+
+/// A moment–curvature law of one material. Kernels are compiled once per law.
+pub(crate) trait BendingLaw: Send + Sync {
+    /// Name of the effect.
+    const NAME: &'static str;
+    /// Whether Ψ' = M: the moment is a function of the curvature alone.
+    const CONSERVATIVE: bool;
+    /// What one hinge remembers between steps; `()` for laws without memory. As many `f64` as [`words`] gives.
+    type Memory: Copy + Default + Send + Sync + bytemuck::Pod;
+
+    /// Moment, slope and energy after a monotone motion from what is remembered to `curvature` [1/m]. Where the
+    /// curvature has not moved, `rate` [1/(m s)] tells the direction of the slope.
+    fn moment(&self, memory: &Self::Memory, curvature: f64, rate: f64) -> Moment;
+
+    /// Takes a monotone motion to `curvature` [1/m] as done. Returns the work done on the place per area [J/m²].
+    fn advance(&self, memory: &mut Self::Memory, curvature: f64) -> f64;
+
+    /// Largest slope on any path over the slope at rest.
+    fn stiffening(&self) -> f64 {
+        1.0
+    }
+
+    /// The curvature at which `memory` was last advanced [1/m]; none for laws without memory.
+    fn last(memory: &Self::Memory) -> Option<f64>;
+}
+
+/// Number of `f64` in a law's memory.
+pub(crate) const fn words<L: BendingLaw>() -> usize {
+    size_of::<L::Memory>() / size_of::<f64>()
+}
+
+/// M = B K.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Linear {
+    rigidity: f64,
+}
+
+impl Linear {
+    /// From the bending rigidity B per width [N m].
+    ///
+    /// # Errors
+    /// [`CoreError::Parameter`] for a rigidity that is negative or not finite.
+    pub fn new(rigidity: f64) -> Result<Self, CoreError> {
+        if !(rigidity.is_finite() && rigidity >= 0.0) {
+            let expected = "a value ≥ 0 in N m";
+            return Err(CoreError::Parameter { name: "bending.rigidity", expected, got: rigidity });
+        }
+        Ok(Self { rigidity })
+    }
+
+    /// B [N m].
+    pub fn rigidity(&self) -> f64 {
+        self.rigidity
+    }
+}
+
+impl BendingLaw for Linear {
+    const NAME: &'static str = "hinge";
+    const CONSERVATIVE: bool = true;
+    type Memory = ();
+
+    #[inline]
+    fn moment(&self, (): &(), curvature: f64, _rate: f64) -> Moment {
+        let moment = self.rigidity * curvature;
+        Moment { moment, slope: self.rigidity, energy: 0.5 * moment * curvature }
+    }
+
+    fn advance(&self, (): &mut (), _curvature: f64) -> f64 {
+        0.0
+    }
+
+    fn last((): &()) -> Option<f64> {
+        None
+    }
+}
+
+impl BendingLaw for Curve {
+    const NAME: &'static str = "nonlinear";
+    const CONSERVATIVE: bool = true;
+    type Memory = ();
+
+    #[inline]
+    fn moment(&self, (): &(), curvature: f64, _rate: f64) -> Moment {
+        Moment {
+            moment: Curve::moment(self, curvature),
+            slope: self.slope(curvature),
+            energy: self.work(curvature),
+        }
+    }
+
+    fn advance(&self, (): &mut (), _curvature: f64) -> f64 {
+        0.0
+    }
+
+    fn last((): &()) -> Option<f64> {
+        None
+    }
+}
