@@ -162,13 +162,24 @@ class SimulationStuck(ClothSimError):
         Vertices that still collide.
     count : int
         How many pairs still collide.
+    pairs : tuple of (int, int, int, int)
+        The four vertices of each: a vertex and its triangle's, or those of two edges.
     """
 
-    def __init__(self, message: str, *, time: float = 0.0, vertices: Sequence[int] = (), count: int = 0) -> None:
+    def __init__(
+        self,
+        message: str,
+        *,
+        time: float = 0.0,
+        vertices: Sequence[int] = (),
+        count: int = 0,
+        pairs: Sequence[tuple[int, int, int, int]] = (),
+    ) -> None:
         super().__init__(message)
         self.time = time
         self.vertices = tuple(vertices)
         self.count = count
+        self.pairs = tuple((int(a), int(b), int(c), int(d)) for a, b, c, d in pairs)
 
 
 class SolverFailed(ClothSimError):

@@ -97,6 +97,10 @@ pub(crate) fn detect_error(py: Python<'_>, error: &DetectError) -> PyErr {
 pub(crate) fn core_error(py: Python<'_>, error: &CoreError) -> PyErr {
     match error {
         CoreError::Parameter { name, expected, got } => invalid_input(py, name, expected, &got.to_string()),
+        CoreError::Missing { name, expected } => invalid_input(py, name, expected, "nothing"),
+        CoreError::NotFinite { name, index, got } => {
+            invalid_input(py, name, "finite numbers", &format!("{got} at index {index}"))
+        }
         CoreError::UnknownMaterial { got, known } => {
             invalid_input(py, "material", &format!("one of {known:?}"), &format!("\"{got}\""))
         }
@@ -151,7 +155,9 @@ pub(crate) fn sim_error(py: Python<'_>, error: &SimError) -> PyErr {
             exception(py, "SimulationStuck", &message, |attributes| {
                 attributes.set_item("time", *time)?;
                 attributes.set_item("vertices", vertices)?;
-                attributes.set_item("count", pairs.len())
+                attributes.set_item("count", pairs.len())?;
+                let pairs: Vec<_> = pairs.iter().map(|&[a, b, c, d]| (a, b, c, d)).collect();
+                attributes.set_item("pairs", pairs)
             })
         }
         SimError::InvalidCheckpoint { .. } => exception(py, "CheckpointError", &message, |_| Ok(())),

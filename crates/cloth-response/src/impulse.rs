@@ -3,7 +3,12 @@
 //! A contact joins two points by weights: relative velocity u = Σ w_k v_k, from the second point to the first. An
 //! impulse p \[N s\] on the first point, −p on the second, changes v_k by w_k p/m_k and u by p/m with the effective
 //! mass m = 1/Σ w_k²/m_k (3.39, 3.40 with the true masses; a prescribed vertex has 1/m_k = 0). It sums to zero
-//! over the vertices since Σ w_k = 0.
+//! over the vertices since Σ w_k = 0: momentum is kept.
+//!
+//! Angular momentum over a step, Σ m x × v̄ about its start (or its end: the same for straight motions), changes by
+//! r × p with r = Σ w_k x_k the vector between the two points at the start. It is kept where p lies along r: points that
+//! meet head on. What is left otherwise is the couple of friction across the gap, at most |r| |p_t|, and the turn of the
+//! normal between start and contact where the points slide as they near.
 //!
 //! Normal law, with λ = n·p the impulse so far and v_n = n·u (n from the second point to the first):
 //!

@@ -283,3 +283,110 @@ fn check(name: &'static str, values: &[Vec3], count: usize) -> Result<(), Respon
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::FrictionRule;
+    use cloth_collision::Body;
+    use cloth_collision::mesh::{TriMesh, generators::grid};
+
+    /// Rounding of sums over 74 vertices and some thousand impulses, relative to their size.
+    const ROUNDING: f64 = 1e-12;
+
+    /// What one step did to two pieces of cloth in space.
+    #[derive(Debug)]
+    struct Met {
+        /// Changes of momentum and of angular momentum.
+        momentum: Vec3,
+        angular: Vec3,
+        /// Σ r × p and Σ |p| over the contacts.
+        moments: Vec3,
+        impulses: f64,
+        contacts: usize,
+    }
+
+    /// One step in which `upper` comes down on `lower` at 3 m/s, sliding by `slide` \[m/s\].
+    fn meet(upper: &TriMesh, lower: &TriMesh, shift: Vec3, slide: f64, friction: f64) -> Met {
+        let body = Body { dynamic: true, self_collision: true };
+        let bodies = [upper, lower].map(|m| (body, m.vertices.len(), &m.triangles[..]));
+        let mesh = CollisionMesh::new(&bodies).unwrap();
+        let x_t0: Vec<Vec3> =
+            upper.vertices.iter().map(|p| p + shift).chain(lower.vertices.iter().copied()).collect();
+        let (count, first) = (x_t0.len(), upper.vertices.len());
+        let speed = |i: usize| if i < first { Vec3::new(slide, -3.0, 0.5 * slide) } else { Vec3::zeros() };
+        let v_t0: Vec<Vec3> = (0..count).map(speed).collect();
+        let inv_mass: Vec<f64> = (0..count).map(|i| 1e3 * (1.0 + (i % 5) as f64)).collect();
+        let dt = 0.005;
+        let mut x_t1: Vec<Vec3> = x_t0.iter().zip(&v_t0).map(|(x, v)| x + v * dt).collect();
+        let mut v = v_t0.clone();
+        let friction = FrictionRule { self_friction: friction, ..FrictionRule::default() };
+        let params = ResponseParams { thickness: 0.004, friction, ..ResponseParams::default() };
+        let mut responder = Responder::new(&mesh, params).unwrap();
+        let mut bvh = Bvh::new(&mesh, &x_t0).unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let info =
+            responder.respond(&mesh, &mut bvh, &inv_mass, &x_t0, &mut x_t1, &mut v, dt, &pool).unwrap();
+        assert_eq!((info.zones, info.held_vertices), (0, 0));
+        let mut met = Met {
+            momentum: Vec3::zeros(),
+            angular: Vec3::zeros(),
+            moments: Vec3::zeros(),
+            impulses: 0.0,
+            contacts: info.impulses,
+        };
+        for i in 0..count {
+            let change = (v[i] - v_t0[i]) / inv_mass[i];
+            met.momentum += change;
+            met.angular += x_t0[i].cross(&change);
+        }
+        for contact in responder.contacts.contacts() {
+            let r: Vec3 = (0..4).map(|k| x_t0[contact.vertices[k] as usize] * contact.weights[k]).sum();
+            met.moments += r.cross(&contact.impulse);
+            met.impulses += contact.impulse.norm();
+        }
+        met
+    }
+
+    /// Momentum is kept; angular momentum changes by Σ r × p over the contacts and by nothing else.
+    #[test]
+    fn momenta_change_as_the_impulses_say() {
+        let (mut upper, lower) = (grid(0.1, 0.1, 5, 5).unwrap(), grid(0.1, 0.1, 7, 7).unwrap());
+        upper.vertices.iter_mut().for_each(|p| p.y = 0.05 * p.x);
+        // By impulses of collisions, and by repulsion of what is near already.
+        for gap in [0.012, 0.003] {
+            for friction in [0.0, 0.3] {
+                let met = meet(&upper, &lower, Vec3::new(0.033, gap, 0.017), 1.0, friction);
+                let size = 0.1 * met.impulses;
+                assert!(met.contacts > 20 && met.momentum.norm() < ROUNDING * met.impulses, "{met:?}");
+                assert!((met.angular - met.moments).norm() < ROUNDING * size, "{met:?}");
+                if friction > 0.0 {
+                    assert!(met.moments.norm() > 1e-4 * size, "friction makes a moment: {met:?}");
+                }
+            }
+        }
+    }
+
+    /// A corner that comes straight down on a triangle sets it spinning, and no angular momentum is made.
+    #[test]
+    fn a_contact_head_on_keeps_angular_momentum() {
+        let triangle = |p: [[f64; 3]; 3]| TriMesh {
+            vertices: p.map(Vec3::from).to_vec(),
+            triangles: vec![[0, 1, 2]],
+            uv: None,
+        };
+        let lower = triangle([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]);
+        let upper = triangle([[0.0, 0.0, 0.0], [0.3, 0.5, 0.0], [0.0, 0.5, 0.3]]);
+        for gap in [0.012, 0.003] {
+            for friction in [0.0, 0.3] {
+                let met = meet(&upper, &lower, Vec3::new(0.2, gap, 0.3), 0.0, friction);
+                assert!(met.contacts == 1 && met.impulses > 1e-4, "{met:?}");
+                assert!(met.momentum.norm() < ROUNDING * met.impulses, "{met:?}");
+                assert!(met.angular.norm() < ROUNDING * met.impulses, "{met:?}");
+                // Planted: a contact that slides with friction across its gap makes a couple.
+                let slid = meet(&upper, &lower, Vec3::new(0.2, gap, 0.3), 1.0, friction);
+                assert!(friction == 0.0 || slid.angular.norm() > 1e-4 * slid.impulses, "{slid:?}");
+            }
+        }
+    }
+}

@@ -56,6 +56,11 @@ impl ContactSet {
         bytes_of(&self.contacts) + bytes_of(&self.looks) + bytes_of(&self.change) + bytes_of(&self.direction)
     }
 
+    #[cfg(test)]
+    pub(crate) fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+
     /// Contacts that carry an impulse.
     pub(crate) fn loaded(&self) -> usize {
         self.contacts.iter().filter(|c| c.impulse.norm_squared() > 0.0).count()

@@ -37,7 +37,10 @@ pub enum SimError {
         vertices: Vec<u32>,
     },
     /// Collisions remain that no allowed motion avoids, at every step size tried.
-    #[error("stuck at t = {time} s: {} pairs still collide after every stage; vertices {}", pairs.len(), list(vertices))]
+    #[error(
+        "stuck at t = {time} s: {} pairs still collide after every stage, the first of vertices {:?}; vertices {}",
+        pairs.len(), pairs.first().unwrap_or(&[0; 4]), list(vertices)
+    )]
     Stuck {
         /// Time of the last good state [s].
         time: f64,
