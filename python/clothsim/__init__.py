@@ -13,7 +13,7 @@ Examples
 (121, 3)
 """
 
-from clothsim import collision, errors
+from clothsim import bending, collision, errors
 from clothsim._core import __version__
 from clothsim.errors import (
     CheckpointError,
@@ -60,6 +60,7 @@ __all__ = [
     "SimulationStuck",
     "SolverFailed",
     "__version__",
+    "bending",
     "collision",
     "errors",
     "materials",

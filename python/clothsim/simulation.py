@@ -20,7 +20,7 @@ from clothsim.errors import CheckpointError, InvalidInput
 from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
 
-__all__ = ["Frame", "Plan", "Simulation", "record"]
+__all__ = ["Frame", "Hinges", "Plan", "Simulation", "record"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +65,34 @@ class Plan(dict[str, Any]):
     def running(self) -> list[str]:
         """Names of the effects that run, in the order of the step."""
         return [effect["name"] for effect in self["effects"] if effect["on"]]
+
+
+@dataclass(frozen=True, eq=False)
+class Hinges:
+    """The shared edges of bending laws that remember, as they stand.
+
+    Attributes
+    ----------
+    vertices : (h, 4) int64
+        Cloth vertices: the shared edge, then the two opposite it.
+    curvature : (h,) float64
+        Change of curvature (θ − θ0)/h̄ against the rest shape [1/m].
+    moment : (h,) float64
+        Moment per width [N].
+    rest_curvature : (h,) float64
+        Curvature about which the hinge rests now [1/m].
+    b1 : (h,) float64
+        Initial rigidity that fatigue has left [N m].
+    frictional_moment : (h,) float64
+        Frictional moment that fatigue has left [N].
+    """
+
+    vertices: Ints
+    curvature: Floats
+    moment: Floats
+    rest_curvature: Floats
+    b1: Floats
+    frictional_moment: Floats
 
 
 class Simulation:
@@ -240,6 +268,11 @@ class Simulation:
     def _moving_colliders(self) -> set[str]:
         colliders = json.loads(self._core.scene())["collider"]
         return {c["name"] for c in colliders if c.get("keyframes") or c.get("sequence")}
+
+    @property
+    def hinges(self) -> Hinges:
+        """What bending has left behind, hinge by hinge; empty where no material has a law that remembers."""
+        return Hinges(*self._core.hinges())
 
     def intersections(self) -> Ints:
         """Pairs of triangles that pass through each other now, shape (k, 2), under the scene's rules of contact.

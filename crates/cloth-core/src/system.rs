@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::{
     Bending, CoreError, EffectInfo, Energy, Environment, InPlane, Material,
     assembly::{Corners, ELEMENTS_PER_CHUNK, ForceClock, ROWS_PER_CHUNK, timed},
-    bending::{BendingLaw, Linear},
+    bending::{BendingLaw, HingeState, Linear},
     forces::{
         ForceModel,
         air::Air,
@@ -143,6 +143,11 @@ impl ClothSystem {
     /// material asks for memory.
     pub fn memory(&self) -> Vec<f64> {
         self.all_models().flat_map(|m| m.memory()).copied().collect()
+    }
+
+    /// Each hinge of a law with memory as it stands.
+    pub fn hinge_states(&self) -> Vec<HingeState> {
+        self.all_models().flat_map(ForceModel::hinge_states).collect()
     }
 
     /// Puts back what [`Self::memory`] gave.

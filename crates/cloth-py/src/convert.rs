@@ -6,8 +6,8 @@
 
 use cloth_sim::core::mesh::Vec3;
 use numpy::{
-    IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArray,
-    PyUntypedArrayMethods,
+    IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 
@@ -75,6 +75,16 @@ pub(crate) fn triangles_from(
         return Err(invalid_input(value.py(), name, &format!("indices in 0..{vertex_count}"), &got));
     }
     Ok(indices.chunks_exact(3).map(|t| [t[0] as u32, t[1] as u32, t[2] as u32]).collect())
+}
+
+/// Numbers from an array of shape (n,), float64; finite or not.
+///
+/// # Errors
+/// `InvalidInput` naming the parameter.
+pub(crate) fn numbers_from(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<f64>> {
+    const EXPECTED: &str = "shape (n,) and float64";
+    let array: PyReadonlyArray1<'_, f64> = value.extract().map_err(|_| wrong(value, name, EXPECTED))?;
+    Ok(array.as_slice().map_err(|_| wrong(value, name, EXPECTED))?.to_vec())
 }
 
 /// Material coordinates [m] of each triangle's corners, from an array of shape (m, 3, 2), float64, finite.

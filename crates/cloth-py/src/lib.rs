@@ -2,6 +2,7 @@
 //!
 //! The Python package `clothsim` is the public face; nothing here is meant to be called by a person.
 
+mod bending;
 mod collision;
 mod convert;
 mod detach;
@@ -27,6 +28,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(mesh::capsule, module)?)?;
     module.add_function(wrap_pyfunction!(mesh::sphere, module)?)?;
     module.add_function(wrap_pyfunction!(mesh::cuboid, module)?)?;
+
+    module.add_function(wrap_pyfunction!(bending::bending_trace, module)?)?;
 
     module.add_function(wrap_pyfunction!(collision::detect, module)?)?;
     module.add_function(wrap_pyfunction!(collision::vertex_triangle_ccd, module)?)?;

@@ -186,6 +186,12 @@ impl PySimulation {
         Ok(crate::convert::indices_to_numpy(py, pairs.into_iter()))
     }
 
+    /// Hinges of bending laws with memory: vertices (h, 4), then curvature, moment, rest curvature, b1, frictional moment.
+    fn hinges<'py>(&self, py: Python<'py>) -> crate::bending::Hinges<'py> {
+        let hinges = self.read(py, Simulation::hinges);
+        crate::bending::hinges_to_numpy(py, &hinges)
+    }
+
     /// Everything, as bytes.
     fn checkpoint<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
         let bytes = self.read(py, Simulation::checkpoint);

@@ -2,10 +2,11 @@
 
 use crate::motion::Motion;
 use crate::scene::{Cloth, Collider, DiagonalPattern, Generator, MeshSource, RestSource};
+use crate::scene::{LENGTH, VELOCITY};
 use crate::{Assets, Scene, SceneError, Vec3};
 use cloth_collision::{DetectError, shapes};
-use cloth_core::Material;
 use cloth_core::mesh::{MeshError, RestShape, Topology, TriMesh, generators};
+use cloth_core::{InPlane, Material};
 use std::ops::Range;
 
 /// What a body is.
@@ -111,13 +112,17 @@ fn cloth_body(
     let mesh = load(scene, assets, &source.mesh, &mesh_key)?;
     let defect = |error: MeshError| mesh_error(scene, &mesh_key, &source.name, &error);
     mesh.check().map_err(defect)?;
+    scene.check_points(&mesh_key, &mesh.vertices, LENGTH, "m", vertex_of(&source.name))?;
     let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
     let material = scene.resolve_material(source, key)?;
     if !matches!(material.bending, cloth_core::Bending::None) {
         topology.require_manifold().map_err(defect)?;
     }
     let rest = match (source.rest, &mesh.uv) {
-        (RestSource::Mesh, _) => RestShape::from_positions(&mesh, Vec3::from(source.warp)),
+        (RestSource::Mesh, _) => {
+            check_warp(scene, source, &mesh, &material, key)?;
+            RestShape::from_positions(&mesh, Vec3::from(source.warp))
+        }
         (RestSource::Uv, Some(uv)) => RestShape::from_uv(uv),
         (RestSource::Uv, None) => {
             let expected = format!("a mesh with UV (\"{}\" takes its rest shape from it)", source.name);
@@ -141,11 +146,47 @@ fn cloth_body(
         if let Some(i) = list.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
             return Err(scene.error(&key, "finite velocities [m/s]", format!("{:?} at vertex {i}", list[i])));
         }
+        scene.check_points(&key, list, VELOCITY, "m/s", vertex_of(&source.name))?;
         for (own, more) in v.iter_mut().zip(list) {
             *own += more;
         }
     }
     Ok(ClothBody { mesh, topology, rest, material, first_vertex, x, v })
+}
+
+/// Refuses a warp that most of a cloth has along its normal: projected into the cloth it gives no direction.
+///
+/// Single triangles of a closed body may have it so; they take a direction of their own.
+fn check_warp(
+    scene: &Scene,
+    source: &Cloth,
+    mesh: &TriMesh,
+    material: &Material,
+    key: &str,
+) -> Result<(), SceneError> {
+    /// Sine of the least angle between warp and normal that gives a direction.
+    const LEAST_SINE: f64 = 1e-6;
+    if !matches!(material.in_plane, InPlane::BaraffWitkin { .. }) {
+        return Ok(());
+    }
+    let warp = Vec3::from(source.warp).normalize();
+    let (mut whole, mut without, mut count) = (0.0, 0.0, 0);
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|v| mesh.vertices[v as usize]);
+        let cross = (b - a).cross(&(c - a));
+        let area = cross.norm();
+        whole += area;
+        if cross.cross(&warp).norm() <= LEAST_SINE * area {
+            without += area;
+            count += 1;
+        }
+    }
+    if without <= 0.5 * whole {
+        return Ok(());
+    }
+    let expected = format!("a direction that is not along the normal of \"{}\"", source.name);
+    let got = format!("{:?}, along that of {count} of {} triangles", source.warp, mesh.triangles.len());
+    Err(scene.error(&format!("{key}.warp"), expected, got))
 }
 
 fn collider_body(
@@ -174,6 +215,8 @@ fn collider_body(
                 let expected = format!("finite coordinates (\"{}\")", source.name);
                 return Err(scene.error(&key, expected, format!("{:?} at frame {f}, vertex {i}", frame[i])));
             }
+            let item = |i| format!("frame {f}, vertex {i} (\"{}\")", source.name);
+            scene.check_points(&key, frame, LENGTH, "m", item)?;
         }
         let mesh = TriMesh { vertices: first.clone(), triangles: asset.triangles.clone(), uv: None };
         mesh.check().map_err(|error| mesh_error(scene, &key, &source.name, &error))?;
@@ -195,10 +238,16 @@ fn collider_body(
         };
         let mesh = load(scene, assets, mesh, &mesh_key)?;
         mesh.check().map_err(|error| mesh_error(scene, &mesh_key, &source.name, &error))?;
+        scene.check_points(&mesh_key, &mesh.vertices, LENGTH, "m", vertex_of(&source.name))?;
         mesh
     };
     let motion = Motion::rigid(&mesh.vertices, source);
     Ok(ColliderBody { triangles: mesh.triangles, uv: mesh.uv, first_vertex, motion })
+}
+
+/// Names a vertex of a body.
+fn vertex_of(name: &str) -> impl Fn(usize) -> String {
+    move |i| format!("vertex {i} of \"{name}\"")
 }
 
 fn load(scene: &Scene, assets: &Assets, source: &MeshSource, key: &str) -> Result<TriMesh, SceneError> {

@@ -1,7 +1,7 @@
 //! The whole simulation as bytes, and back to the same bits.
 //!
 //! Layout, little-endian: magic, version (u32), length of the payload (u64), payload, FNV-1a checksum of the payload (u64).
-//! Payload: scene (JSON), options, state, pending steps, assets, report (JSON).
+//! Payload: scene (JSON), options, state, what bending laws remember, pending steps, assets, report (JSON).
 
 use crate::simulation::Pending;
 use crate::step::State;
@@ -10,7 +10,7 @@ use cloth_core::mesh::TriMesh;
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
@@ -25,6 +25,7 @@ impl Simulation {
         payload.points(&self.state.x);
         payload.points(&self.state.v);
         payload.points(&self.state.contact_force);
+        payload.numbers(&self.integrator.system().memory());
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
         payload.u64(pending.steps);
         payload.f64(pending.dt);
@@ -63,6 +64,7 @@ impl Simulation {
         if x.len() != v.len() {
             return Err(invalid("as many velocities as positions", format!("{} and {}", v.len(), x.len())));
         }
+        let memory = payload.numbers()?;
         let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
         let assets = payload.assets()?;
         let report = payload.text()?;
@@ -70,6 +72,9 @@ impl Simulation {
             return Err(invalid("the end of the payload", format!("{} more bytes", payload.0.len())));
         }
         let mut sim = Self::build(&scene, assets, options, Some(State { time, step, x, v, contact_force }))?;
+        sim.integrator
+            .set_memory(&memory)
+            .map_err(|e| invalid("what this scene's laws remember", e.to_string()))?;
         sim.pending = (pending.steps > 0).then_some(pending);
         let threads = sim.report.threads;
         sim.report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
@@ -134,6 +139,13 @@ impl Writer {
     fn text(&mut self, text: &str) {
         self.u64(text.len() as u64);
         self.0.extend(text.as_bytes());
+    }
+
+    fn numbers(&mut self, numbers: &[f64]) {
+        self.u64(numbers.len() as u64);
+        for n in numbers {
+            self.f64(*n);
+        }
     }
 
     fn points(&mut self, points: &[Vec3]) {
@@ -214,6 +226,11 @@ impl Reader<'_> {
         let (head, rest) = self.0.split_at(count);
         self.0 = rest;
         String::from_utf8(head.to_vec()).map_err(|e| invalid("text in UTF-8", e.to_string()))
+    }
+
+    fn numbers(&mut self) -> Result<Vec<f64>, SimError> {
+        let count = self.count(8)?;
+        (0..count).map(|_| self.f64()).collect()
     }
 
     fn points(&mut self) -> Result<Vec<Vec3>, SimError> {

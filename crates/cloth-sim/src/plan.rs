@@ -83,7 +83,7 @@ fn bytes(count: usize) -> String {
 }
 
 /// Effects of the dynamics that a scene may call for, what calls for them, and what is the case where nothing does.
-const DYNAMICS: [(&str, &str, &str); 7] = [
+const DYNAMICS: [(&str, &str, &str); 10] = [
     ("gravity", "gravity is not zero", "gravity is zero"),
     ("wind", "air.drag or air.lift is above zero", "air.density, or air.drag and air.lift, are zero"),
     ("air-damping", "air.damping is above zero", "air.damping is zero"),
@@ -99,6 +99,9 @@ const DYNAMICS: [(&str, &str, &str); 7] = [
         "no material has bending.model = \"bending-spring\" with a stiffness or damping",
     ),
     ("hinge", "bending.model = \"hinge\"", "no material has bending.model = \"hinge\" with a rigidity"),
+    ("nonlinear", "bending.model = \"nonlinear\"", "no material has bending.model = \"nonlinear\""),
+    ("plastic", "bending.model = \"plastic\"", "no material has bending.model = \"plastic\""),
+    ("hysteresis", "bending.model = \"hysteresis\"", "no material has bending.model = \"hysteresis\""),
 ];
 
 /// Collects effects that are on and effects that are off.
@@ -182,7 +185,7 @@ pub(crate) fn build(
     effects.on("guard", "always", bodies.cloth_vertices, 0);
 
     let mut warnings = Vec::new();
-    let stable_dt = explicit.then(|| integrator.stable_step(&state.x, &state.v));
+    let stable_dt = method.has_stability_limit().then(|| integrator.stable_step(&state.x, &state.v));
     if let Some(stable) = stable_dt.filter(|stable| scene.time.dt > *stable) {
         warnings.push(format!(
             "time.dt = {} s is above the largest stable step of \"{}\", about {stable:.3e} s: the run is likely to diverge",

@@ -260,6 +260,11 @@ impl Simulation {
         self.integrator.system().masses()
     }
 
+    /// Each hinge of a bending law with memory as it stands; none where no material asks for memory.
+    pub fn hinges(&self) -> Vec<cloth_core::bending::HingeState> {
+        self.integrator.system().hinge_states()
+    }
+
     /// Which effects run and why.
     pub fn plan(&self) -> &Plan {
         &self.plan
@@ -360,6 +365,7 @@ fn integrator_params(scene: &Scene) -> IntegratorParams {
         psd: scene.time.indefinite,
         newton_tolerance: scene.time.newton_tolerance,
         newton_max_iterations: scene.time.newton_max_iterations,
+        bending_substeps: scene.time.bending_substeps,
         ..IntegratorParams::default()
     }
 }

@@ -233,6 +233,7 @@ impl Simulation {
             };
             self.state.contact_force = (0..v.len()).map(force).collect();
         }
+        self.integrator.accept(&x);
         self.state.x = x;
         self.state.v = v;
         self.state.time = t1;
@@ -391,6 +392,75 @@ pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = 
         let mut whole = simulation();
         whole.step().unwrap();
         assert_ne!(retried.state.x, whole.state.x, "the comparison sees a difference");
+    }
+
+    /// The scene with a law that remembers, folded far enough by its pin for friction to be overcome.
+    fn remembering() -> Simulation {
+        let text = SCENE.replace(
+            "in_plane = { model = \"spring\", stiffness = 50.0 } }",
+            "in_plane = { model = \"spring\", stiffness = 50.0 }, \
+             bending = { model = \"hysteresis\", b1 = 2e-3, b2 = 1e-3, c1 = -5e-3, plasticity = 0.3, fatigue = 0.1 } }",
+        );
+        let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+        let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+        Simulation::new(&scene, Assets::default(), options).unwrap()
+    }
+
+    #[test]
+    fn history_is_committed_once_per_accepted_step() {
+        let mut retried = remembering();
+        assert!(retried.integrator.system().remembers());
+        // Both halves of the first attempt at full size fail, and so does one at half size.
+        retried.fail = |time, dt| (time < 0.005 && dt > 0.006) || (time < 0.03 && time > 0.015 && dt > 0.003);
+        for _ in 0..5 {
+            retried.step().unwrap();
+        }
+        let retries: u32 = retried.report.steps.iter().map(|s| s.retries as u32).sum();
+        assert!(retries >= 2, "{retries}");
+        let mut straight = remembering();
+        for step in &retried.report.steps {
+            // The sizes that were accepted, one after the other.
+            let (start, substeps) = (straight.time(), step.substeps as u32);
+            for k in 1..=substeps {
+                let end = if k == substeps {
+                    step.time
+                } else {
+                    start + step.dt * f64::from(k) / f64::from(substeps)
+                };
+                straight.step_to(end, step.dt / f64::from(substeps)).unwrap();
+            }
+        }
+        let memory = retried.integrator.system().memory();
+        assert_eq!(memory, straight.integrator.system().memory());
+        assert_eq!(retried.state.x, straight.state.x);
+        let mut whole = remembering();
+        for _ in 0..5 {
+            whole.step().unwrap();
+        }
+        assert_ne!(memory, whole.integrator.system().memory(), "the comparison sees a difference");
+        assert!(memory.iter().any(|m| *m != 0.0));
+    }
+
+    #[test]
+    fn history_survives_a_checkpoint_to_the_same_bits() {
+        let mut sim = remembering();
+        for _ in 0..30 {
+            sim.step().unwrap();
+        }
+        let mut resumed = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
+        assert_eq!(resumed.hinges(), sim.hinges());
+        let mut forgetful = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
+        let nothing = remembering().integrator.system().memory();
+        forgetful.integrator.set_memory(&nothing).unwrap();
+        for _ in 0..30 {
+            for sim in [&mut sim, &mut resumed, &mut forgetful] {
+                sim.step().unwrap();
+            }
+        }
+        assert_eq!(resumed.state, sim.state);
+        assert_eq!(resumed.hinges(), sim.hinges());
+        assert_ne!(forgetful.state.x, sim.state.x, "memory that is lost is seen");
+        assert!(sim.hinges().iter().any(|h| h.place.rest_curvature != 0.0), "some bend has stayed");
     }
 
     #[test]

@@ -25,7 +25,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{BendingLaw, Curve, Moment};
+use super::{BendingLaw, Curve, Moment, Place};
 use crate::CoreError;
 
 /// Law of the loop for one material.
@@ -61,13 +61,6 @@ impl Default for Loop {
     /// An unused place, flat.
     fn default() -> Self {
         Self { rest: 0.0, left: 1.0, window: 0.0, curvature: 0.0, friction: 0.0, peak: 0.0 }
-    }
-}
-
-impl Loop {
-    /// Rest curvature (θ_r − θ_0)/h̄ [1/m].
-    pub fn rest_curvature(&self) -> f64 {
-        self.rest
     }
 }
 
@@ -121,17 +114,17 @@ impl Hysteresis {
     }
 
     /// Initial rigidity b_1 that fatigue has left at a place [N m].
-    pub fn b1(&self, place: &Loop) -> f64 {
+    fn b1(&self, place: &Loop) -> f64 {
         self.curve.b2() + place.left * (self.curve.b1() - self.curve.b2())
     }
 
     /// Frictional moment M_0 that fatigue has left at a place [N].
-    pub fn frictional_moment(&self, place: &Loop) -> f64 {
+    fn frictional_moment(&self, place: &Loop) -> f64 {
         place.left * place.left * self.m0
     }
 
     /// Moment per width at a place [N].
-    pub fn moment_at(&self, place: &Loop) -> f64 {
+    fn moment_at(&self, place: &Loop) -> f64 {
         self.curve.b2() * place.curvature + place.friction
     }
 
@@ -261,6 +254,14 @@ impl BendingLaw for Hysteresis {
             self.end_cycle(place);
         }
         work + self.follow(place, sigma, curvature - place.rest)
+    }
+
+    fn place(&self, place: &Loop) -> Place {
+        Place {
+            rest_curvature: place.rest,
+            b1: self.b1(place),
+            frictional_moment: self.frictional_moment(place),
+        }
     }
 
     /// 2 b_1 − b_2: loading again right after a little unloading from a side.

@@ -33,6 +33,30 @@ pub(crate) struct Moment {
     pub(crate) energy: f64,
 }
 
+/// A hinge of a law with memory as it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HingeState {
+    /// Its corners in the global arrays: the shared edge, then the opposite vertices.
+    pub vertices: [u32; 4],
+    /// Change of curvature (θ − θ_0)/h̄ [1/m].
+    pub curvature: f64,
+    /// Moment per width [N].
+    pub moment: f64,
+    /// What its path has made of it.
+    pub place: Place,
+}
+
+/// What a path has made of a place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Curvature (θ_r − θ_0)/h̄ about which it rests [1/m].
+    pub rest_curvature: f64,
+    /// Initial rigidity b_1 that fatigue has left [N m].
+    pub b1: f64,
+    /// Frictional moment M_0 that fatigue has left; of the plastic law the moment at its limit [N].
+    pub frictional_moment: f64,
+}
+
 /// A moment–curvature law of one material. Kernels are compiled once per law.
 pub(crate) trait BendingLaw: Send + Sync {
     /// Name of the effect.
@@ -48,6 +72,9 @@ pub(crate) trait BendingLaw: Send + Sync {
 
     /// Takes a monotone motion to `curvature` [1/m] as done. Returns the work done on the place per area [J/m²].
     fn advance(&self, memory: &mut Self::Memory, curvature: f64) -> f64;
+
+    /// What the path has made of a place.
+    fn place(&self, memory: &Self::Memory) -> Place;
 
     /// Largest slope on any path over the slope at rest.
     fn stiffening(&self) -> f64 {
@@ -103,6 +130,10 @@ impl BendingLaw for Linear {
         0.0
     }
 
+    fn place(&self, (): &()) -> Place {
+        Place { rest_curvature: 0.0, b1: self.rigidity, frictional_moment: 0.0 }
+    }
+
     fn last((): &()) -> Option<f64> {
         None
     }
@@ -124,6 +155,10 @@ impl BendingLaw for Curve {
 
     fn advance(&self, (): &mut (), _curvature: f64) -> f64 {
         0.0
+    }
+
+    fn place(&self, (): &()) -> Place {
+        Place { rest_curvature: 0.0, b1: self.b1(), frictional_moment: self.m0() }
     }
 
     fn last((): &()) -> Option<f64> {

@@ -9,7 +9,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::{BendingLaw, Moment};
+use super::{BendingLaw, Moment, Place};
 use crate::CoreError;
 
 /// Elastic limit and plastic flow of one material.
@@ -30,13 +30,6 @@ pub struct Flow {
     curvature: f64,
 }
 
-impl Flow {
-    /// Plastic curvature K_p, at which the moment is zero [1/m].
-    pub fn rest_curvature(&self) -> f64 {
-        self.plastic
-    }
-}
-
 impl Plastic {
     /// From the rigidity B [N m], the elastic limit K_y [1/m] and the hardening H [N m].
     ///
@@ -55,13 +48,8 @@ impl Plastic {
         Ok(Self { rigidity, elastic_limit, hardening })
     }
 
-    /// B [N m].
-    pub fn rigidity(&self) -> f64 {
-        self.rigidity
-    }
-
     /// Moment at the elastic limit B K_y [N].
-    pub fn limit_moment(&self) -> f64 {
+    fn limit_moment(&self) -> f64 {
         self.rigidity * self.elastic_limit
     }
 
@@ -104,6 +92,10 @@ impl BendingLaw for Plastic {
         *place = Flow { plastic: place.plastic + flow, curvature };
         let after = self.stored(curvature - place.plastic, place.plastic);
         after - before + self.limit_moment() * flow.abs()
+    }
+
+    fn place(&self, place: &Flow) -> Place {
+        Place { rest_curvature: place.plastic, b1: self.rigidity, frictional_moment: self.limit_moment() }
     }
 
     fn last(place: &Flow) -> Option<f64> {

@@ -1,6 +1,6 @@
 //! A law alone along a path of curvatures.
 
-use super::{BendingLaw, Curve, Hysteresis, Linear, Loop, Plastic};
+use super::{BendingLaw, Curve, Hysteresis, Linear, Plastic};
 use crate::CoreError;
 
 /// One of the laws.
@@ -42,29 +42,24 @@ pub fn trace(law: &Law, curvature: &[f64]) -> Result<Trace, CoreError> {
         return Err(CoreError::NotFinite { name: "curvature", index, got: curvature[index] });
     }
     Ok(match law {
-        Law::Linear(law) => follow(law, curvature, |()| [0.0, law.rigidity(), 0.0]),
-        Law::Nonlinear(law) => follow(law, curvature, |()| [0.0, law.b1(), law.m0()]),
-        Law::Plastic(law) => {
-            follow(law, curvature, |place| [place.rest_curvature(), law.rigidity(), law.limit_moment()])
-        }
-        Law::Hysteresis(law) => follow(law, curvature, |place: &Loop| {
-            [place.rest_curvature(), law.b1(place), law.frictional_moment(place)]
-        }),
+        Law::Linear(law) => follow(law, curvature),
+        Law::Nonlinear(law) => follow(law, curvature),
+        Law::Plastic(law) => follow(law, curvature),
+        Law::Hysteresis(law) => follow(law, curvature),
     })
 }
 
-fn follow<L: BendingLaw>(law: &L, curvature: &[f64], state: impl Fn(&L::Memory) -> [f64; 3]) -> Trace {
+fn follow<L: BendingLaw>(law: &L, curvature: &[f64]) -> Trace {
     let mut trace = Trace::default();
-    let mut place = L::Memory::default();
+    let mut memory = L::Memory::default();
     let mut work = 0.0;
     for &k in curvature {
-        work += law.advance(&mut place, k);
-        let now = law.moment(&place, k, 0.0);
-        let [rest, b1, m0] = state(&place);
+        work += law.advance(&mut memory, k);
+        let (now, place) = (law.moment(&memory, k, 0.0), law.place(&memory));
         trace.moment.push(now.moment);
-        trace.rest_curvature.push(rest);
-        trace.b1.push(b1);
-        trace.frictional_moment.push(m0);
+        trace.rest_curvature.push(place.rest_curvature);
+        trace.b1.push(place.b1);
+        trace.frictional_moment.push(place.frictional_moment);
         trace.dissipated.push(if L::CONSERVATIVE { 0.0 } else { work - now.energy });
     }
     trace

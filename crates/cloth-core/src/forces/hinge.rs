@@ -29,7 +29,7 @@ use super::{CouplingKind, Couplings, ForceModel, Psd, corner_pairs};
 use crate::{
     CoreError, EffectInfo, Energy,
     assembly::ELEMENTS_PER_CHUNK,
-    bending::{BendingLaw, words},
+    bending::{BendingLaw, HingeState, words},
     mesh::Vec3,
 };
 
@@ -215,6 +215,15 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                 law.advance(memory, Self::curvature(&rest[element], memory, angle));
             }
         });
+    }
+
+    fn hinge_states(&self) -> Vec<HingeState> {
+        let state = |(vertices, memory): (&[u32; 4], &L::Memory)| {
+            let curvature = L::last(memory)?;
+            let moment = self.law.moment(memory, curvature, 0.0).moment;
+            Some(HingeState { vertices: *vertices, curvature, moment, place: self.law.place(memory) })
+        };
+        self.vertices.iter().zip(&self.memory).filter_map(state).collect()
     }
 
     fn memory(&self) -> &[f64] {

@@ -23,7 +23,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::{EffectInfo, Energy, mesh::Vec3};
+use crate::{EffectInfo, Energy, bending::HingeState, mesh::Vec3};
 
 /// What is done about the indefinite part of Hessian blocks.
 ///
@@ -138,6 +138,11 @@ pub(crate) trait ForceModel: Send + Sync {
     /// As [`Self::memory`], to be written by one who resumes.
     fn memory_mut(&mut self) -> &mut [f64] {
         &mut []
+    }
+
+    /// Each hinge of a law with memory as it stands; empty for other models.
+    fn hinge_states(&self) -> Vec<HingeState> {
+        Vec::new()
     }
 
     /// Number of elements.

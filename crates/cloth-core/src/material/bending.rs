@@ -3,7 +3,7 @@
 use super::not_negative;
 use crate::{
     CoreError,
-    bending::{Curve, Hysteresis, Linear, Plastic},
+    bending::{Curve, Hysteresis, Law, Linear, Plastic},
 };
 
 /// Out-of-plane law.
@@ -184,6 +184,20 @@ impl PlasticBending {
 }
 
 impl Bending {
+    /// Moment over curvature; none without a law of that kind (no bending, springs).
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn law(&self) -> Result<Option<Law>, CoreError> {
+        Ok(match self {
+            Self::None | Self::Spring { .. } => None,
+            Self::Hinge { rigidity, .. } => Some(Law::Linear(Linear::new(*rigidity)?)),
+            Self::Nonlinear(law) => Some(Law::Nonlinear(law.curve()?)),
+            Self::Plastic(law) => Some(Law::Plastic(law.law()?)),
+            Self::Hysteresis(law) => Some(Law::Hysteresis(law.law()?)),
+        })
+    }
+
     /// Refuses values that give no law.
     ///
     /// # Errors

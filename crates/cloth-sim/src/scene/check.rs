@@ -16,6 +16,7 @@ impl Scene {
         self.positive("time.dt", self.time.dt, "s")?;
         self.positive("time.newton_tolerance", self.time.newton_tolerance, "")?;
         self.at_least_one("time.newton_max_iterations", self.time.newton_max_iterations)?;
+        self.at_least_one("time.bending_substeps", self.time.bending_substeps)?;
         if self.time.max_halvings > MAX_HALVINGS {
             return Err(self.error("time.max_halvings", "0 to 16", self.time.max_halvings.to_string()));
         }
@@ -40,7 +41,7 @@ impl Scene {
         for (i, collider) in self.collider.iter().enumerate() {
             self.check_collider(collider, &format!("collider[{i}]"))?;
         }
-        Ok(())
+        self.check_sizes()
     }
 
     fn check_contact(&self) -> Result<(), SceneError> {
@@ -117,6 +118,9 @@ impl Scene {
                 Ok(()) => Ok(*material),
                 Err(CoreError::Parameter { name, expected, got }) => {
                     Err(self.error(&format!("{key}.material.{name}"), expected, format!("{got}")))
+                }
+                Err(CoreError::Missing { name, expected }) => {
+                    Err(self.error(&format!("{key}.material.{name}"), expected, "nothing"))
                 }
                 Err(other) => Err(self.error(&format!("{key}.material"), "a material", other.to_string())),
             },

@@ -2,6 +2,7 @@
 //!
 //! SI units: m, kg, s, N, rad. Keys that are not known are refused, never skipped.
 
+mod bounds;
 mod check;
 mod cloth;
 mod collider;
@@ -22,6 +23,7 @@ pub use world::{Air, Contact, Time, Up};
 
 use cloth_core::SolverParams;
 use serde::{Deserialize, Serialize};
+pub(crate) use bounds::{LENGTH, VELOCITY};
 use source::Source;
 use std::sync::Arc;
 

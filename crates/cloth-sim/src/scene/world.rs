@@ -28,6 +28,8 @@ pub struct Time {
     pub newton_tolerance: f64,
     /// Newton's method stops after this many iterations (`implicit-newton`), ≥ 1.
     pub newton_max_iterations: usize,
+    /// α: explicit sub-steps for bending in one step (`semi-implicit`), ≥ 1.
+    pub bending_substeps: usize,
     /// How often a step that fails is halved before the run stops.
     pub max_halvings: u32,
 }
@@ -41,6 +43,7 @@ impl Default for Time {
             indefinite: core.psd,
             newton_tolerance: core.newton_tolerance,
             newton_max_iterations: core.newton_max_iterations,
+            bending_substeps: core.bending_substeps,
             max_halvings: 6,
         }
     }
