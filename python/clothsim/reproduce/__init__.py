@@ -1,0 +1,19 @@
+"""The figures and tables of the papers that clothsim implements, each one command.
+
+| file | what it holds |
+|---|---|
+| `catalogue` | every figure and table of both papers, and its state |
+| `contract` | what the module of a figure offers, and what it is given |
+| `job` | one figure from measurement to files |
+| `kes` | the thesis's units, its fabrics |
+| `pictures` | one style for plots and rendered tiles |
+| `figure_…`, `table_…` | one figure or table each |
+
+A figure that becomes reproducible is one module with the names of `contract.Reproduction` and one word in the catalogue.
+"""
+
+from clothsim.reproduce.catalogue import CATALOGUE, Entry, find
+from clothsim.reproduce.contract import Check, Effort, Table
+from clothsim.reproduce.job import Outcome, reproduce
+
+__all__ = ["CATALOGUE", "Check", "Effort", "Entry", "Outcome", "Table", "find", "reproduce"]

@@ -1,0 +1,157 @@
+"""What the module of a figure offers, and what it is given."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any, Protocol, TypeVar
+
+from clothsim._arrays import optional
+
+__all__ = ["Check", "Effort", "Reproduction", "Table"]
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class Reproduction(Protocol):
+    """The names that the module of a figure or table has; the first function measures, the others show it.
+
+    Attributes
+    ----------
+    THESIS : str
+        What the paper says or shows, in one sentence with its numbers.
+    """
+
+    THESIS: str
+
+    def measure(self, effort: Effort) -> Any:
+        """Do the work, and return what the other functions take."""
+
+    def parameters(self, measured: Any) -> Mapping[str, Any]:
+        """Everything that was chosen, with units in the names: the paper's parameters, and those that it leaves open."""
+
+    def tables(self, measured: Any) -> Mapping[str, Table]:
+        """Tables by the end of their file's name; "" for the only or main one."""
+
+    def draw(self, measured: Any) -> bytes:
+        """Draw the picture: the content of a PNG file."""
+
+    def here(self, measured: Any) -> str:
+        """What came out, in one sentence with its numbers: the answer to `THESIS`."""
+
+    def checks(self, measured: Any) -> Sequence[Check]:
+        """Compare with closed forms and with findings of the paper that must come out again."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A CSV file.
+
+    Attributes
+    ----------
+    columns : sequence of str
+        Names with units: ``"curvature [1/m]"``.
+    rows : iterable of sequences
+        Numbers and strings.
+    """
+
+    columns: Sequence[str]
+    rows: Iterable[Sequence[Any]]
+
+    def text(self, parameters: Mapping[str, Any]) -> str:
+        """CSV whose first lines, each with a ``#``, are the parameters."""
+        lines = [f"# {name}: {_cell(value)}" for name, value in parameters.items()]
+        lines.append(",".join(self.columns))
+        lines += [",".join(_cell(value) for value in row) for row in self.rows]
+        return "\n".join(lines) + "\n"
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    return str(value)
+
+
+@dataclass(frozen=True)
+class Check:
+    """A measured number against what it has to be.
+
+    Attributes
+    ----------
+    what : str
+        The quantity with its unit.
+    here : float
+        As measured.
+    expected : float
+        As it has to be.
+    tolerance : float
+        Largest difference that passes.
+    reason : str
+        Where the expected value comes from, and why the tolerance.
+    """
+
+    what: str
+    here: float
+    expected: float
+    tolerance: float
+    reason: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether the numbers agree; NaN never does."""
+        return math.isfinite(self.here) and abs(self.here - self.expected) <= self.tolerance
+
+    def facts(self) -> dict[str, Any]:
+        """The check as a table for JSON."""
+        return {
+            "what": self.what, "here": self.here, "expected": self.expected, "tolerance": self.tolerance,
+            "passed": self.passed, "reason": self.reason,
+        }  # fmt: skip
+
+    @classmethod
+    def true(cls, what: str, found: bool, reason: str) -> Check:
+        """Check a finding that is true or not."""
+        return cls(what, float(found), 1.0, 0.0, reason)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much work may be spent.
+
+    Attributes
+    ----------
+    quick : bool
+        A coarse variant of the same experiment: seconds.
+    threads : int
+        How many threads.
+    progress : bool
+        Show a bar on stderr.
+    """
+
+    quick: bool = False
+    threads: int = field(default_factory=lambda: _threads())
+    progress: bool = False
+
+    def bar(self, total: int, name: str, unit: str = "step") -> Any:
+        """Return a progress bar with an estimate of the time left; close it."""
+        tqdm = optional("tqdm", extra="all", purpose="showing progress")
+        return tqdm.tqdm(total=total, desc=name, unit=unit, disable=not self.progress, dynamic_ncols=True)
+
+    def each(self, work: Any, items: Sequence[Item]) -> Iterator[Any]:
+        """Yield ``work(item)`` for each item in its order, on as many threads as there are.
+
+        For simulations, which take one thread each here: they release the interpreter while they step.
+        """
+        pool = ThreadPoolExecutor(max_workers=max(1, min(self.threads, len(items))))
+        try:
+            yield from pool.map(work, items)
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _threads() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
