@@ -166,6 +166,10 @@ impl CollisionMesh {
         !self.is_attached(first, second)
     }
 
+    pub(crate) fn has_attachments(&self) -> bool {
+        self.has_attachments
+    }
+
     /// Whether a vertex of one feature is attached to the other's body.
     #[inline]
     pub(crate) fn is_attached(&self, first: &[u32], second: &[u32]) -> bool {

@@ -147,6 +147,91 @@ fn crumpled_sheets_agree_with_every_pair() {
     assert!(total > 100, "neighbours must meet, found {total}");
 }
 
+/// [`self_intersections`] on one thread, which must be what other numbers of threads find.
+fn found(triangles: &[[u32; 3]], x: &[Vec3]) -> Vec<[u32; 2]> {
+    let found = self_intersections(triangles, x, pool_of_one()).unwrap();
+    for threads in [2, 5] {
+        assert_eq!(self_intersections(triangles, x, &pool(threads)).unwrap(), found, "{threads} threads");
+    }
+    found
+}
+
+#[test]
+fn a_large_crumpled_sheet_agrees_with_every_pair() {
+    let mut random = Random(70);
+    let (mut x, triangles) = sheet(48, &mut random);
+    for p in &mut x {
+        *p = Vec3::new(0.4 * p.x, p.y, p.z) + random.vector(0.01);
+    }
+    let expected = by_every_pair(&CollisionMesh::single(x.len(), &triangles).unwrap(), &x);
+    assert!(expected.len() > 300, "the sheet must meet itself, found {}", expected.len());
+    assert_eq!(found(&triangles, &x), expected);
+}
+
+#[test]
+fn nothing_and_next_to_nothing() {
+    assert!(found(&[], &[]).is_empty());
+    let x = TARGET.map(Vec3::from);
+    assert!(found(&[], &x).is_empty());
+    assert!(found(&[[0, 1, 2]], &x).is_empty());
+    assert!(found(&[[0, 1, 2], [2, 1, 0]], &x).is_empty(), "one triangle, twice");
+}
+
+#[test]
+fn one_huge_triangle_among_many_small_ones() {
+    let mut random = Random(71);
+    let (mut x, mut triangles) = soup(700, 0.01, &mut random);
+    let first = x.len() as u32;
+    x.extend([[-4e3, -5e3, 0.01], [6e3, -3e3, 0.02], [1e2, 7e3, -0.03]].map(Vec3::from));
+    triangles.insert(350, [first, first + 1, first + 2]);
+    let expected = by_every_pair(&CollisionMesh::single(x.len(), &triangles).unwrap(), &x);
+    assert!(expected.iter().filter(|p| p.contains(&350)).count() > 5);
+    assert_eq!(found(&triangles, &x), expected);
+}
+
+#[test]
+fn far_from_the_origin_and_with_an_outlier() {
+    let mut random = Random(72);
+    let (near, mut triangles) = soup(300, 0.1, &mut random);
+    let mut x: Vec<Vec3> = near.iter().map(|p| p + Vec3::repeat(1e6)).collect();
+    let expected = by_every_pair(&CollisionMesh::single(x.len(), &triangles).unwrap(), &x);
+    assert!(expected.len() > 100);
+    assert_eq!(found(&triangles, &x), expected);
+    // Far beyond the rest: in single precision all others are one point.
+    let first = x.len() as u32;
+    x.extend([Vec3::repeat(1e18), Vec3::new(1e18, 1e18, 2e18), Vec3::new(1e18, 2e18, 1e18)]);
+    triangles.push([first, first + 1, first + 2]);
+    assert_eq!(found(&triangles, &x), expected);
+}
+
+#[test]
+fn triangles_in_one_place() {
+    // Without area, all in one point: none meets.
+    let points = vec![Vec3::new(0.3, 0.2, 0.1); 90];
+    let triangles: Vec<[u32; 3]> = (0..30).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    assert!(found(&triangles, &points).is_empty());
+    // With area, all alike: each meets each.
+    let alike: Vec<Vec3> = (0..30).flat_map(|_| TARGET).map(Vec3::from).collect();
+    let every: Vec<[u32; 2]> = (0..30).flat_map(|s| (s + 1..30).map(move |t| [s, t])).collect();
+    assert_eq!(found(&triangles, &alike), every);
+}
+
+#[test]
+fn a_gap_below_single_precision_is_seen() {
+    let gap = 1e-11;
+    for (height, meets) in [(gap, false), (-gap, true)] {
+        // A corner above the inside of a triangle, a side above a side, a lid above a face.
+        for second in [
+            [[1.0, height, 1.0], [1.0, 2.0, 1.5], [1.5, 2.0, 1.0]],
+            [[1.0, height, -1.0], [1.0, height, 1.0], [1.0, 2.0, 0.5]],
+            [[1.0, height, 1.0], [1.0, 2.0 * gap, 2.0], [2.0, 2.0 * gap, 1.0]],
+        ] {
+            let x: Vec<Vec3> = TARGET.iter().chain(&second).map(|&p| Vec3::from(p)).collect();
+            assert_eq!(!found(&[[0, 1, 2], [3, 4, 5]], &x).is_empty(), meets, "{second:?}");
+        }
+    }
+}
+
 #[test]
 fn a_flat_sheet_does_not_meet_itself() {
     let mut random = Random(1);

@@ -1,57 +1,107 @@
 //! Building the tree: once per topology.
 
-use super::{LEAF_TRIANGLES, Leaf, Node};
-use crate::bounds::LANES;
+use super::LEAF_TRIANGLES;
+use crate::bounds::{LANES, middle};
 use crate::{CollisionMesh, Vec3};
 use cloth_mesh::NONE;
+use std::ops::Range;
 
-/// What does not change after the build.
+/// What does not change after the build: a tree per body, all of the same height.
+///
+/// A node is a block: its lanes are triangles in a leaf, blocks of the level below elsewhere. Blocks are numbered
+/// by level, the leaves first, and within a level by body.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tree {
-    /// Preorder: the left child follows its parent.
-    pub(super) nodes: Vec<Node>,
     pub(super) leaves: Vec<Leaf>,
-    /// Triangles of each leaf, [`NONE`] in unused lanes; block = leaf.
+    /// Triangles of each leaf, [`NONE`] in unused lanes.
     pub(super) triangle_ids: Vec<[u32; LANES]>,
-    /// Their vertices, side by side where they are looked at together.
-    pub(super) corners: Vec<[[u32; 3]; LANES]>,
+    /// Their vertices, `[corner][lane]`.
+    pub(super) corners: Vec<[[u32; LANES]; 3]>,
     /// Vertices owned by the triangles of a leaf, in blocks.
     pub(super) vertex_ids: Vec<[u32; LANES]>,
     /// Edges owned by the triangles of a leaf, in blocks.
     pub(super) edge_ids: Vec<[u32; LANES]>,
+    /// The blocks above the leaves.
+    pub(super) inner: Vec<Inner>,
+    pub(super) roots: Vec<Root>,
 }
 
-/// Median splits of each body's triangles along the longest axis of their centroids' box, down to full leaves; above
-/// the bodies, median splits of the bodies.
+/// A leaf: its number of triangles and the ranges of its feature blocks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Leaf {
+    pub(super) count: u32,
+    pub(super) vertex_blocks: [u32; 2],
+    pub(super) edge_blocks: [u32; 2],
+}
+
+/// A block of `count` blocks from `first` on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Inner {
+    pub(super) first: u32,
+    pub(super) count: u32,
+}
+
+/// The block above all triangles of a body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Root {
+    pub(super) block: u32,
+    pub(super) body: u32,
+}
+
+impl Tree {
+    pub(super) fn block_count(&self) -> usize {
+        self.leaves.len() + self.inner.len()
+    }
+
+    /// The block, if it is above the leaves.
+    #[inline(always)]
+    pub(super) fn inner(&self, block: u32) -> Option<&Inner> {
+        self.inner.get((block as usize).wrapping_sub(self.leaves.len()))
+    }
+}
+
+/// Median splits of each body's triangles along the longest axis of their centroids' box, down to full leaves.
 ///
-/// The split of the triangles runs on the pool, if there is one; it does not depend on it.
+/// The splits run on the pool, if there is one; they do not depend on it.
 pub(super) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::ThreadPool>) -> Tree {
-    let mut tree = Tree::default();
+    let origin = middle(x);
     let mut items: Vec<Item> = mesh
         .triangles
         .iter()
         .enumerate()
         .map(|(t, tri)| {
-            // Thirds before the sum: no overflow at any finite position.
-            let c: Vec3 = tri.iter().map(|&v| x[v as usize] / 3.0).sum();
+            // Thirds before the sum: no overflow.
+            let third = |v: u32| (x[v as usize] - origin) * (1.0 / 3.0);
+            let c = third(tri[0]) + third(tri[1]) + third(tri[2]);
             Item { centroid: [c.x as f32, c.y as f32, c.z as f32], triangle: t as u32 }
         })
         .collect();
+    let mut tree = Tree::default();
+    let mut levels: Vec<(u32, Range<u32>)> = vec![];
     // Triangles come body by body.
     let body_of = |item: &Item| mesh.vertex_body[mesh.triangles[item.triangle as usize][0] as usize];
-    let mut bodies: Vec<(u32, &mut [Item])> = items
-        .chunk_by_mut(|a, b| body_of(a) == body_of(b))
-        .map(|chunk| (body_of(&chunk[0]), chunk))
-        .collect();
-    for (_, items) in &mut bodies {
+    for items in items.chunk_by_mut(|a, b| body_of(a) == body_of(b)) {
+        let body = body_of(&items[0]);
         match pool {
             Some(pool) if items.len() > PARALLEL => pool.install(|| arrange(items)),
             _ => arrange(items),
         }
+        let first = tree.leaves.len() as u32;
+        for leaf in items.chunks(LEAF_TRIANGLES) {
+            push_leaf(mesh, leaf, &mut tree);
+        }
+        levels.push((body, first..tree.leaves.len() as u32));
     }
-    if !bodies.is_empty() {
-        split_bodies(mesh, &mut bodies, &mut tree);
+    while levels.iter().any(|(_, level)| level.len() > 1) {
+        for (_, level) in &mut levels {
+            let start = tree.block_count() as u32;
+            for first in level.clone().step_by(LANES) {
+                tree.inner.push(Inner { first, count: (level.end - first).min(LANES as u32) });
+            }
+            *level = start..tree.block_count() as u32;
+        }
     }
+    tree.roots = levels.into_iter().map(|(body, level)| Root { block: level.start, body }).collect();
     tree
 }
 
@@ -61,52 +111,45 @@ struct Item {
     triangle: u32,
 }
 
-fn longest_axis(centroids: impl Iterator<Item = [f32; 3]>) -> usize {
+fn longest_axis(items: &[Item]) -> usize {
     let (mut lo, mut hi) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    for c in centroids {
+    for Item { centroid: c, .. } in items {
         for axis in 0..3 {
-            lo[axis] = lo[axis].min(c[axis]);
-            hi[axis] = hi[axis].max(c[axis]);
+            lo[axis] = if c[axis] < lo[axis] { c[axis] } else { lo[axis] };
+            hi[axis] = if c[axis] > hi[axis] { c[axis] } else { hi[axis] };
         }
     }
     (1..3).fold(0, |best, axis| if hi[axis] - lo[axis] > hi[best] - lo[best] { axis } else { best })
 }
 
-fn split_bodies(mesh: &CollisionMesh, bodies: &mut [(u32, &mut [Item])], tree: &mut Tree) {
-    if let [(body, items)] = bodies {
-        push_subtree(mesh, *body, items, tree);
-        return;
-    }
-    let middle_of = |items: &[Item]| items[items.len() / 2].centroid;
-    let axis = longest_axis(bodies.iter().map(|b| middle_of(b.1)));
-    bodies.sort_by(|a, b| middle_of(a.1)[axis].total_cmp(&middle_of(b.1)[axis]));
-    let node = tree.nodes.len();
-    tree.nodes.push(Node { right: NONE, leaf: NONE, body: NONE });
-    let (left, right) = bodies.split_at_mut(bodies.len() / 2);
-    split_bodies(mesh, left, tree);
-    tree.nodes[node].right = tree.nodes.len() as u32;
-    split_bodies(mesh, right, tree);
-}
-
 /// Triangles from which on the two halves are arranged in parallel.
 const PARALLEL: usize = 4096;
 
-/// How many triangles the left one of two children has: full leaves, half of all, rounded up.
+/// How many of more triangles than a leaf holds go to the left half: those of half of the children of their block.
 fn left_count(count: usize) -> usize {
-    count.div_ceil(LEAF_TRIANGLES).div_ceil(2) * LEAF_TRIANGLES
+    let mut child = LEAF_TRIANGLES;
+    while child * LANES < count {
+        child *= LANES;
+    }
+    count.div_ceil(child).div_ceil(2) * child
 }
 
 /// Brings the triangles into the order of the leaves.
 fn arrange(items: &mut [Item]) {
+    fn split<const AXIS: usize>(items: &mut [Item], left: usize) {
+        // Of equal centroids any may go left: the selection depends on nothing but its input.
+        items.select_nth_unstable_by(left, |a, b| a.centroid[AXIS].total_cmp(&b.centroid[AXIS]));
+    }
     if items.len() <= LEAF_TRIANGLES {
         return;
     }
-    let axis = longest_axis(items.iter().map(|i| i.centroid));
-    let half = left_count(items.len());
-    items.select_nth_unstable_by(half - 1, |a, b| {
-        a.centroid[axis].total_cmp(&b.centroid[axis]).then(a.triangle.cmp(&b.triangle))
-    });
-    let (left, right) = items.split_at_mut(half);
+    let left = left_count(items.len());
+    match longest_axis(items) {
+        0 => split::<0>(items, left),
+        1 => split::<1>(items, left),
+        _ => split::<2>(items, left),
+    }
+    let (left, right) = items.split_at_mut(left);
     if left.len() + right.len() > PARALLEL && rayon::current_thread_index().is_some() {
         rayon::join(|| arrange(left), || arrange(right));
     } else {
@@ -115,58 +158,57 @@ fn arrange(items: &mut [Item]) {
     }
 }
 
-/// The subtree of arranged triangles.
-fn push_subtree(mesh: &CollisionMesh, body: u32, items: &mut [Item], tree: &mut Tree) {
-    let node = tree.nodes.len();
-    tree.nodes.push(Node { right: NONE, leaf: NONE, body });
-    if items.len() <= LEAF_TRIANGLES {
-        tree.nodes[node].leaf = tree.leaves.len() as u32;
-        push_leaf(mesh, node as u32, items, tree);
-        return;
-    }
-    let (left, right) = items.split_at_mut(left_count(items.len()));
-    push_subtree(mesh, body, left, tree);
-    tree.nodes[node].right = tree.nodes.len() as u32;
-    push_subtree(mesh, body, right, tree);
-}
-
-fn push_leaf(mesh: &CollisionMesh, node: u32, items: &mut [Item], tree: &mut Tree) {
-    items.sort_unstable_by_key(|i| i.triangle);
+fn push_leaf(mesh: &CollisionMesh, items: &[Item], tree: &mut Tree) {
     let mut triangles = [NONE; LANES];
-    let mut corners = [[NONE; 3]; LANES];
-    let (mut vertices, mut edges) = (Vec::new(), Vec::new());
+    let mut corners = [[NONE; LANES]; 3];
+    let (first_vertex_block, first_edge_block) = (tree.vertex_ids.len() as u32, tree.edge_ids.len() as u32);
+    // A mesh without features has no owners: its leaves hold triangles only.
+    let has_features = !mesh.triangle_edges.is_empty();
+    let (mut vertices, mut edges) = (Features::default(), Features::default());
     for (lane, item) in items.iter().enumerate() {
         let t = item.triangle;
         triangles[lane] = t;
-        corners[lane] = mesh.triangles[t as usize];
-        // A mesh without features has no owners: its leaves hold triangles only.
-        let Some(sides) = mesh.triangle_edges.get(t as usize) else { continue };
         for k in 0..3 {
-            let (v, e) = (mesh.triangles[t as usize][k], sides[k]);
-            if mesh.vertex_owner[v as usize] == t {
-                vertices.push(v);
-            }
-            if mesh.edge_owner[e as usize] == t {
-                edges.push(e);
+            let v = mesh.triangles[t as usize][k];
+            corners[k][lane] = v;
+            if has_features {
+                let e = mesh.triangle_edges[t as usize][k];
+                vertices.push_if(mesh.vertex_owner[v as usize] == t, v);
+                edges.push_if(mesh.edge_owner[e as usize] == t, e);
             }
         }
     }
-    let (first_vertex_block, first_edge_block) = (tree.vertex_ids.len() as u32, tree.edge_ids.len() as u32);
-    push_blocks(&vertices, &mut tree.vertex_ids);
-    push_blocks(&edges, &mut tree.edge_ids);
+    vertices.push_blocks(&mut tree.vertex_ids);
+    edges.push_blocks(&mut tree.edge_ids);
     tree.triangle_ids.push(triangles);
     tree.corners.push(corners);
     tree.leaves.push(Leaf {
-        node,
+        count: items.len() as u32,
         vertex_blocks: [first_vertex_block, tree.vertex_ids.len() as u32],
         edge_blocks: [first_edge_block, tree.edge_ids.len() as u32],
     });
 }
 
-fn push_blocks(ids: &[u32], blocks: &mut Vec<[u32; LANES]>) {
-    for chunk in ids.chunks(LANES) {
-        let mut block = [NONE; LANES];
-        block[..chunk.len()].copy_from_slice(chunk);
-        blocks.push(block);
+/// Features of one kind that the triangles of a leaf own.
+#[derive(Default)]
+struct Features {
+    ids: [u32; 3 * LEAF_TRIANGLES],
+    count: usize,
+}
+
+impl Features {
+    fn push_if(&mut self, is_owned: bool, id: u32) {
+        if is_owned {
+            self.ids[self.count] = id;
+            self.count += 1;
+        }
+    }
+
+    fn push_blocks(&self, blocks: &mut Vec<[u32; LANES]>) {
+        for chunk in self.ids[..self.count].chunks(LANES) {
+            let mut block = [NONE; LANES];
+            block[..chunk.len()].copy_from_slice(chunk);
+            blocks.push(block);
+        }
     }
 }

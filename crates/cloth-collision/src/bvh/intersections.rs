@@ -1,14 +1,17 @@
 //! Pairs of triangles that pass through each other, by the tree.
 
-use super::traverse::{LeafPairs, Visit};
-use super::{Bvh, leaf_pair, leaf_pair::TrianglePair};
-use crate::ccd::filter::{
-    Row, filter, four_joined_triangles_apart, four_triangles_beside_planes, four_triangles_maybe_apart, row,
+use super::build::Tree;
+use super::traverse::{LeafPairs, Visit, traverse};
+use super::{Bvh, leaf_pair, leaf_pair::TrianglePairs};
+use crate::bounds::LANES;
+use crate::ccd::filter::{filter, in_lanes};
+use crate::intersect::filter::{
+    Row, eight_joined_triangles_apart, eight_triangles_apart, eight_triangles_decided,
+    eight_triangles_maybe_apart, rows,
 };
 use crate::intersect::{segment_meets_triangle, triangles_meet};
 use crate::{CollisionMesh, DetectError, Mode, Query, Vec3};
-use cloth_mesh::NONE;
-use rayon::slice::ParallelSliceMut;
+use rayon::prelude::*;
 
 impl Bvh {
     /// As [`crate::intersections`], with this tree.
@@ -24,138 +27,163 @@ impl Bvh {
         let query = Query { x_t0: x, x_t1: x, thickness: 0.0, mode: Mode::Discrete, active: None };
         query.check(mesh)?;
         self.check_mesh(mesh)?;
-        self.refit(mesh, &query, pool);
-        let rows: Vec<Row> = x.iter().map(row).collect();
-        let (visits, _) = self.traverse(mesh, pool, || Meetings {
+        self.refit_still(mesh, &query, pool);
+        let points = self.points(&rows(x), pool);
+        let (visits, _) = traverse(&self.tree, &self.still, mesh, pool, || Meetings {
             mesh,
+            tree: &self.tree,
             x,
-            rows: &rows,
-            waiting: vec![],
-            strangers: vec![],
-            joined: vec![],
+            points: &points,
+            waiting: TrianglePairs::default(),
             left: vec![],
+            undecided: vec![],
+            joined: vec![],
             found: vec![],
         });
-        let mut found: Vec<[u32; 2]> = visits.into_iter().flat_map(|v| v.found).collect();
+        let mut found: Vec<u64> = visits.into_iter().flat_map(|v| v.found).collect();
         pool.install(|| found.par_sort_unstable());
-        Ok(found)
+        Ok(found.into_iter().map(|pair| [(pair >> 32) as u32, pair as u32]).collect())
+    }
+
+    /// The corners of each triangle, by its place: side by side where they are looked at together.
+    fn points(&self, rows: &[Row], pool: &rayon::ThreadPool) -> Vec<[Row; 3]> {
+        let mut points = vec![[Row::default(); 3]; self.tree.leaves.len() * LANES];
+        let leaves = points.par_chunks_mut(LANES).zip(&self.tree.leaves).zip(&self.tree.corners);
+        pool.install(|| {
+            leaves.with_min_len(LEAF_CHUNK).for_each(|((points, leaf), corners)| {
+                for lane in 0..leaf.count as usize {
+                    for k in 0..3 {
+                        points[lane][k] = rows[corners[k][lane] as usize];
+                    }
+                }
+            });
+        });
+        points
     }
 }
 
 struct Meetings<'a> {
     mesh: &'a CollisionMesh,
+    tree: &'a Tree,
     x: &'a [Vec3],
-    rows: &'a [Row],
-    waiting: Vec<TrianglePair>,
-    /// Pairs of triangles without a common vertex.
-    strangers: Vec<TrianglePair>,
-    /// Pairs of triangles with one common vertex.
+    /// The corners of each triangle, by its place.
+    points: &'a [[Row; 3]],
+    waiting: TrianglePairs,
+    /// What the first filter leaves.
+    left: Vec<[u32; 2]>,
+    /// What the signs in single precision leave.
+    undecided: Vec<[u32; 2]>,
     joined: Vec<Joined>,
-    /// What the first round of the filter leaves.
-    left: Vec<TrianglePair>,
-    found: Vec<[u32; 2]>,
+    /// The lower triangle in the upper half: sorted as the pairs are.
+    found: Vec<u64>,
 }
 
+/// Two triangles with a common vertex.
 #[derive(Debug, Clone, Copy)]
 struct Joined {
-    pair: [u32; 2],
-    common: u32,
-    /// The other corners.
-    first: [u32; 2],
-    second: [u32; 2],
+    places: [u32; 2],
+    /// Which of its corners the common vertex is.
+    common: [u8; 2],
 }
 
-/// Bit per corner of `one`: `other` has it too.
-#[allow(
-    clippy::needless_bitwise_bool,
-    reason = "most pairs are strangers: nine comparisons without a branch"
-)]
-fn common_corners(one: &[u32; 3], other: &[u32; 3]) -> u8 {
-    let bit = |k: usize| u8::from((one[k] == other[0]) | (one[k] == other[1]) | (one[k] == other[2])) << k;
-    bit(0) | bit(1) | bit(2)
+/// The corners after each corner.
+const NEXT: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+
+impl Joined {
+    #[inline]
+    fn new(tree: &Tree, places: [u32; 2]) -> Self {
+        let (first, second) = (corners(tree, places[0]), corners(tree, places[1]));
+        let is_common = |v: u32| second.contains(&v);
+        let k = usize::from(is_common(first[1])) + 2 * usize::from(is_common(first[2]));
+        let j = usize::from(second[1] == first[k]) + 2 * usize::from(second[2] == first[k]);
+        Self { places, common: [k as u8, j as u8] }
+    }
+
+    /// The common vertex, the other corners of the first triangle, those of the second.
+    #[inline]
+    fn select<'a, T>(&self, first: &'a [T; 3], second: &'a [T; 3]) -> [&'a T; 5] {
+        let [k, j] = self.common;
+        let ([a, b], [p, q]) = (NEXT[k as usize], NEXT[j as usize]);
+        [&first[k as usize], &first[a], &first[b], &second[p], &second[q]]
+    }
 }
 
-fn sorted([s, t]: [u32; 2]) -> [u32; 2] {
-    [s.min(t), s.max(t)]
+#[inline]
+fn corners(tree: &Tree, place: u32) -> [u32; 3] {
+    let (leaf, lane) = (&tree.corners[place as usize / LANES], place as usize % LANES);
+    [leaf[0][lane], leaf[1][lane], leaf[2][lane]]
 }
 
+/// Leaves per task.
+const LEAF_CHUNK: usize = 256;
 /// Pairs wait until there are so many.
 const FLUSH: usize = 1024;
 
 impl Meetings<'_> {
     fn flush(&mut self) {
-        let Self { x, rows, strangers, joined, left, found, .. } = self;
-        let row = |v: u32| &rows[v as usize];
-        let rows_of_pair = |pair: &TrianglePair| {
-            let (s, t) = (&pair.first, &pair.second);
-            [row(s[0]), row(s[1]), row(s[2]), row(t[0]), row(t[1]), row(t[2])]
+        let Self { mesh, tree, x, points, left, undecided, joined, found, .. } = self;
+        let TrianglePairs { strangers, joined: joined_places } = &mut self.waiting;
+        let triangle = |place: u32| tree.triangle_ids[place as usize / LANES][place as usize % LANES];
+        let mut report = |places: [u32; 2]| {
+            let (s, t) = (triangle(places[0]), triangle(places[1]));
+            found.push(u64::from(s.min(t)) << 32 | u64::from(s.max(t)));
         };
-        filter(strangers, rows_of_pair, |rows| four_triangles_maybe_apart(rows, 0.0), |pair| left.push(pair));
-        filter(
-            left,
-            rows_of_pair,
-            |rows| four_triangles_beside_planes(rows, 0.0),
-            |pair| {
-                let points = |t: &[u32; 3]| [x[t[0] as usize], x[t[1] as usize], x[t[2] as usize]];
-                if triangles_meet(&points(&pair.first), &points(&pair.second)) {
-                    found.push(sorted(pair.triangles));
-                }
-            },
-        );
-        let rows_of_joined = |pair: &Joined| {
-            let ([a, b], [p, q]) = (pair.first, pair.second);
-            [row(pair.common), row(a), row(b), row(p), row(q)]
+
+        if mesh.has_attachments() {
+            let is_attached = |&[s, t]: &[u32; 2]| mesh.is_attached(&corners(tree, s), &corners(tree, t));
+            strangers.retain(|pair| !is_attached(pair));
+            joined_places.retain(|pair| !is_attached(pair));
+        }
+        let points_of = |place: u32| &points[place as usize];
+        let positions_of = |place: u32| {
+            let [a, b, c] = corners(tree, place);
+            [x[a as usize], x[b as usize], x[c as usize]]
         };
-        filter(
-            joined,
-            rows_of_joined,
-            |rows| four_joined_triangles_apart(rows, 0.0),
-            |pair| {
-                let point = |v: u32| x[v as usize];
-                let common = point(pair.common);
-                let (a, b) = (pair.first.map(point), pair.second.map(point));
-                if segment_meets_triangle(&a, &[common, b[0], b[1]])
-                    || segment_meets_triangle(&b, &[common, a[0], a[1]])
-                {
-                    found.push(pair.pair);
-                }
-            },
-        );
-        left.clear();
-        joined.clear();
+        let rows_of_pair = |&[s, t]: &[u32; 2]| {
+            let ([a, b, c], [d, e, f]) = (points_of(s), points_of(t));
+            [a, b, c, d, e, f]
+        };
+        filter(strangers, rows_of_pair, eight_triangles_maybe_apart, |pair| left.push(pair));
+        in_lanes(left, rows_of_pair, eight_triangles_decided, |pair, [apart, meet], lane| {
+            if meet >> lane & 1 == 1 {
+                report(pair);
+            } else if apart >> lane & 1 == 0 {
+                undecided.push(pair);
+            }
+        });
+        filter(undecided, rows_of_pair, eight_triangles_apart, |[s, t]| {
+            if triangles_meet(&positions_of(s), &positions_of(t)) {
+                report([s, t]);
+            }
+        });
+
+        joined.extend(joined_places.iter().map(|&places| Joined::new(tree, places)));
+        let rows_of_joined =
+            |pair: &Joined| pair.select(points_of(pair.places[0]), points_of(pair.places[1]));
+        filter(joined, rows_of_joined, eight_joined_triangles_apart, |pair| {
+            let (first, second) = (positions_of(pair.places[0]), positions_of(pair.places[1]));
+            let [&common, &a, &b, &p, &q] = pair.select(&first, &second);
+            if segment_meets_triangle(&[a, b], &[common, p, q])
+                || segment_meets_triangle(&[p, q], &[common, a, b])
+            {
+                report(pair.places);
+            }
+        });
         strangers.clear();
+        left.clear();
+        undecided.clear();
+        joined_places.clear();
+        joined.clear();
     }
 }
 
-impl Visit for Meetings<'_> {
-    fn leaf_pair(&mut self, leaves: &LeafPairs<'_>, a: u32, b: u32) {
-        leaf_pair::triangles(leaves.tree, leaves.boxes, a, b, &mut self.waiting);
-        for pair in self.waiting.drain(..) {
-            let TrianglePair { triangles, first, second } = pair;
-            // The traversal has seen to the bodies.
-            if triangles.contains(&NONE) || self.mesh.is_attached(&first, &second) {
-                continue;
-            }
-            let corners = common_corners(&first, &second);
-            match corners.count_ones() {
-                0 => self.strangers.push(pair),
-                1 => {
-                    let others =
-                        |tri: [u32; 3], k: u32| [tri[(k as usize + 1) % 3], tri[(k as usize + 2) % 3]];
-                    let (k, j) = (corners.trailing_zeros(), common_corners(&second, &first).trailing_zeros());
-                    self.joined.push(Joined {
-                        pair: sorted(triangles),
-                        common: first[k as usize],
-                        first: others(first, k),
-                        second: others(second, j),
-                    });
-                }
-                _ => {}
-            }
-        }
-        if self.strangers.len() + self.joined.len() > FLUSH {
+impl Visit<1> for Meetings<'_> {
+    fn leaf_pair(&mut self, leaves: &LeafPairs<'_, 1>, a: u32, b: u32) {
+        let TrianglePairs { strangers, joined } = &mut self.waiting;
+        if strangers.len() + joined.len() > FLUSH {
             self.flush();
         }
+        leaf_pair::triangles(leaves.tree, leaves.boxes, a, b, &mut self.waiting);
     }
 
     fn finish(&mut self) {

@@ -1,7 +1,7 @@
 //! Bounding volume hierarchy of fixed topology over the scene's triangles.
 //!
-//! [`build`] splits once; [`refit`] follows the motion with boxes at both ends of the step; [`traverse`] meets the
-//! tree with itself and [`leaf_pair`] the features of two leaves, each feature from the one triangle that owns it;
+//! [`build`] splits once, into blocks of eight; [`refit`] follows the motion with boxes at both ends of the step;
+//! [`traverse`] meets the tree with itself and [`leaf_pair`] the features of two leaves, each feature from the one triangle that owns it;
 //! [`narrow`] decides what they yield while it streams by.
 
 mod build;
@@ -19,29 +19,10 @@ use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use build::Tree;
 use refit::Boxes;
 use std::time::Instant;
-use traverse::Streaming;
+use traverse::{Streaming, traverse};
 
 /// Triangles of a full leaf: one block.
 const LEAF_TRIANGLES: usize = LANES;
-
-/// One node of the tree, in preorder: the left child is the next node.
-#[derive(Debug, Clone, Copy)]
-struct Node {
-    /// Right child, [`NONE`] in a leaf.
-    right: u32,
-    /// Leaf index, [`NONE`] in an inner node.
-    leaf: u32,
-    /// The body of all triangles below, [`NONE`] if there are several.
-    body: u32,
-}
-
-/// A leaf: its node and the ranges of its feature blocks.
-#[derive(Debug, Clone, Copy)]
-struct Leaf {
-    node: u32,
-    vertex_blocks: [u32; 2],
-    edge_blocks: [u32; 2],
-}
 
 /// A hierarchy built once per topology and refitted in every call.
 ///
@@ -51,7 +32,8 @@ pub struct Bvh {
     vertex_count: usize,
     triangle_count: usize,
     tree: Tree,
-    boxes: Boxes,
+    moving: Boxes<2>,
+    still: Boxes<1>,
 }
 
 impl Bvh {
@@ -81,7 +63,8 @@ impl Bvh {
             vertex_count: mesh.vertex_count,
             triangle_count: mesh.triangles.len(),
             tree: build::build(mesh, x, pool),
-            boxes: Boxes::default(),
+            moving: Boxes::default(),
+            still: Boxes::default(),
         })
     }
 
@@ -92,11 +75,15 @@ impl Bvh {
         Err(DetectError::OtherMesh { expected: self.triangle_count, got: mesh.triangles.len() })
     }
 
-    fn refit(&mut self, mesh: &CollisionMesh, query: &Query<'_>, pool: &rayon::ThreadPool) {
-        let start = if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 };
-        // Two boxes meet: half the thickness each.
-        self.boxes.refit(&self.tree, mesh, start, query.x_t1, 0.5 * query.thickness, query.active, pool);
+    /// Fits the boxes at rest to the end of the step.
+    fn refit_still(&mut self, mesh: &CollisionMesh, query: &Query<'_>, pool: &rayon::ThreadPool) {
+        self.still.refit(&self.tree, mesh, [query.x_t1], margin(query), query.active, pool);
     }
+}
+
+/// Two boxes meet: half the thickness each.
+fn margin(query: &Query<'_>) -> f64 {
+    0.5 * query.thickness
 }
 
 impl Detector for Bvh {
@@ -113,10 +100,21 @@ impl Detector for Bvh {
         query.check(mesh)?;
         self.check_mesh(mesh)?;
         let start = Instant::now();
-        self.refit(mesh, query, pool);
+        let is_moving = query.mode == Mode::Continuous;
+        if is_moving {
+            let x = [query.x_t0, query.x_t1];
+            self.moving.refit(&self.tree, mesh, x, margin(query), query.active, pool);
+        } else {
+            self.refit_still(mesh, query, pool);
+        }
         let fitted = Instant::now();
         let scene = narrow::Scene::new(mesh, query);
-        let (visits, counts) = self.traverse(mesh, pool, || Streaming::new(narrow::Narrow::new(&scene)));
+        let visit = || Streaming::new(narrow::Narrow::new(&scene));
+        let (visits, counts) = if is_moving {
+            traverse(&self.tree, &self.moving, mesh, pool, visit)
+        } else {
+            traverse(&self.tree, &self.still, mesh, pool, visit)
+        };
         let traversed = Instant::now();
         let mut out = narrow::merge(visits.into_iter().map(|v| v.sink));
         out.stats.broad_phase_tests = counts.box_tests;

@@ -1,7 +1,7 @@
 //! Pairs within a distance of each other at one state, with their closest points.
 
 use super::Bvh;
-use super::traverse::{Candidates, Sink, Streaming};
+use super::traverse::{Candidates, Sink, Streaming, traverse};
 use crate::ccd::filter::{Row, filter, four_edge_edges_beyond, four_vertex_triangles_beyond, row};
 use crate::distance::{edge_edge, vertex_triangle};
 use crate::{CollisionMesh, DetectError, Mode, Query, Stencil, StencilKind, Vec3};
@@ -33,7 +33,7 @@ impl Bvh {
         let query = Query { x_t0: x, x_t1: x, thickness, mode: Mode::Discrete, active };
         query.check(mesh)?;
         self.check_mesh(mesh)?;
-        self.refit(mesh, &query, pool);
+        self.refit_still(mesh, &query, pool);
         let rows: Vec<Row> = x.iter().map(row).collect();
         let sink = || Near {
             mesh,
@@ -43,7 +43,7 @@ impl Bvh {
             vertex_triangle: vec![],
             edge_edge: vec![],
         };
-        let (visits, _) = self.traverse(mesh, pool, || Streaming::new(sink()));
+        let (visits, _) = traverse(&self.tree, &self.still, mesh, pool, || Streaming::new(sink()));
 
         let (mut vertex_triangle, mut edge_edge) = (vec![], vec![]);
         for Streaming { sink, .. } in visits {

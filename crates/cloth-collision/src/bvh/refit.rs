@@ -1,116 +1,111 @@
-//! New boxes for the present positions: per vertex, per feature block, per node.
+//! New boxes for the present positions: per vertex, per feature block, per block of the tree.
 
 use super::build::Tree;
-use crate::bounds::{Block, LANES, MovingBox};
+use crate::bounds::{Block, LANES, MovingBox, middle};
 use crate::{CollisionMesh, Vec3};
 use cloth_mesh::NONE;
 use rayon::prelude::*;
 
-/// The boxes of one call.
+/// The boxes of one call: at both ends of the step, or at rest.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Boxes {
-    /// Both ends are equal.
-    pub(super) still: bool,
-    pub(super) vertices: Vec<MovingBox>,
-    pub(super) nodes: Vec<MovingBox>,
-    /// Whether a vertex of the subtree's triangles is active.
-    pub(super) node_active: Vec<bool>,
-    pub(super) triangle_blocks: Vec<Block>,
-    pub(super) vertex_blocks: Vec<Block>,
-    pub(super) edge_blocks: Vec<Block>,
+pub(super) struct Boxes<const ENDS: usize> {
+    pub(super) vertices: Vec<MovingBox<ENDS>>,
+    /// The tree's blocks, leaves first.
+    pub(super) blocks: Vec<Block<ENDS>>,
+    /// The box around all lanes of each block.
+    pub(super) hulls: Vec<MovingBox<ENDS>>,
+    /// Which lanes of each block are used, and which of these have an active vertex below them.
+    pub(super) lanes: Vec<BlockLanes>,
+    pub(super) vertex_blocks: Vec<Block<ENDS>>,
+    pub(super) edge_blocks: Vec<Block<ENDS>>,
+}
+
+/// Bit per lane.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BlockLanes {
+    pub(super) used: u32,
+    pub(super) active: u32,
 }
 
 /// Work per task; fixed, though nothing here depends on it.
 const VERTEX_CHUNK: usize = 4096;
 const BLOCK_CHUNK: usize = 256;
 
-impl Boxes {
-    /// Fits all boxes to the motion from `x_t0` to `x_t1` \[m\] (the same slice: at rest), inflated by `margin` \[m\].
+impl<const ENDS: usize> Boxes<ENDS> {
+    /// Fits all boxes to the positions `x` \[m\] at the ends, inflated by `margin` \[m\].
     pub(super) fn refit(
         &mut self,
         tree: &Tree,
         mesh: &CollisionMesh,
-        x_t0: &[Vec3],
-        x_t1: &[Vec3],
+        x: [&[Vec3]; ENDS],
         margin: f64,
         active: Option<&[bool]>,
         pool: &rayon::ThreadPool,
     ) {
-        let origin = middle(x_t0);
-        let still = std::ptr::eq(x_t0, x_t1);
-        self.still = still;
+        let origin = middle(x[0]);
+        let leaf_count = tree.leaves.len();
         self.vertices.resize(mesh.vertex_count, MovingBox::EMPTY);
-        self.triangle_blocks.resize(tree.triangle_ids.len(), Block::EMPTY);
+        self.blocks.resize(tree.block_count(), Block::EMPTY);
+        self.hulls.resize(tree.block_count(), MovingBox::EMPTY);
+        self.lanes.resize(tree.block_count(), BlockLanes::default());
         self.vertex_blocks.resize(tree.vertex_ids.len(), Block::EMPTY);
         self.edge_blocks.resize(tree.edge_ids.len(), Block::EMPTY);
-        self.nodes.resize(tree.nodes.len(), MovingBox::EMPTY);
-        self.node_active.resize(tree.nodes.len(), true);
 
-        let (vertices, triangle_blocks) = (&mut self.vertices, &mut self.triangle_blocks);
-        let (vertex_blocks, edge_blocks) = (&mut self.vertex_blocks, &mut self.edge_blocks);
+        let Self { vertices, blocks, hulls, vertex_blocks, edge_blocks, .. } = self;
         pool.install(|| {
             vertices.par_chunks_mut(VERTEX_CHUNK).enumerate().for_each(|(chunk, boxes)| {
                 for (k, b) in boxes.iter_mut().enumerate() {
-                    let v = chunk * VERTEX_CHUNK + k;
-                    *b = if still {
-                        MovingBox::of_still_vertex(&x_t0[v], &origin, margin)
-                    } else {
-                        MovingBox::of_vertex(&x_t0[v], &x_t1[v], &origin, margin)
-                    };
+                    *b = MovingBox::of_vertex(&x, chunk * VERTEX_CHUNK + k, &origin, margin);
                 }
             });
             let vertices = &*vertices;
-            fill(triangle_blocks, &tree.triangle_ids, vertices, |t| &mesh.triangles[t]);
-            fill(edge_blocks, &tree.edge_ids, vertices, |e| &mesh.edges[e]);
-            vertex_blocks.par_chunks_mut(BLOCK_CHUNK).zip(tree.vertex_ids.par_chunks(BLOCK_CHUNK)).for_each(
-                |(blocks, ids)| {
-                    for (block, ids) in blocks.iter_mut().zip(ids) {
-                        for (lane, &v) in ids.iter().enumerate().filter(|&(_, &v)| v != NONE) {
-                            block.set(lane, &vertices[v as usize]);
-                        }
+            fill(&mut blocks[..leaf_count], &tree.triangle_ids, vertices, |t| mesh.triangles[t]);
+            fill(edge_blocks, &tree.edge_ids, vertices, |e| mesh.edges[e]);
+            fill(vertex_blocks, &tree.vertex_ids, vertices, |v| [v as u32]);
+            hulls[..leaf_count].par_chunks_mut(BLOCK_CHUNK).zip(blocks.par_chunks(BLOCK_CHUNK)).for_each(
+                |(hulls, blocks)| {
+                    for (hull, block) in hulls.iter_mut().zip(blocks) {
+                        *hull = block.hull();
                     }
                 },
             );
         });
-
-        for node in (0..tree.nodes.len()).rev() {
-            let shape = &tree.nodes[node];
-            let (mut bounds, mut is_active) = (MovingBox::EMPTY, active.is_none());
-            if shape.leaf == NONE {
-                for child in [node + 1, shape.right as usize] {
-                    bounds.grow(&self.nodes[child]);
-                    is_active |= self.node_active[child];
-                }
-            } else {
-                bounds = self.triangle_blocks[shape.leaf as usize].hull();
-                if let Some(mask) = active {
-                    let triangles = tree.triangle_ids[shape.leaf as usize].iter().filter(|&&t| t != NONE);
-                    is_active =
-                        triangles.flat_map(|&t| &mesh.triangles[t as usize]).any(|&v| mask[v as usize]);
-                }
+        for (k, leaf) in tree.leaves.iter().enumerate() {
+            let used = first_lanes(leaf.count);
+            let is_active = |mask: &[bool], t: u32| {
+                t != NONE && mesh.triangles[t as usize].iter().any(|&v| mask[v as usize])
+            };
+            let active = active.map_or(used, |mask| bits(tree.triangle_ids[k].map(|t| is_active(mask, t))));
+            self.lanes[k] = BlockLanes { used, active };
+        }
+        for (k, inner) in tree.inner.iter().enumerate() {
+            let (mut bounds, mut is_active) = (Block::EMPTY, [false; LANES]);
+            for lane in 0..inner.count as usize {
+                let child = inner.first as usize + lane;
+                bounds.set(lane, &self.hulls[child]);
+                is_active[lane] = self.lanes[child].active != 0;
             }
-            self.nodes[node] = bounds;
-            self.node_active[node] = is_active;
+            self.blocks[leaf_count + k] = bounds;
+            self.hulls[leaf_count + k] = bounds.hull();
+            self.lanes[leaf_count + k] =
+                BlockLanes { used: first_lanes(inner.count), active: bits(is_active) };
         }
     }
 }
 
-/// Middle of the positions' box: coordinates relative to it keep the most digits in single precision.
-fn middle(x: &[Vec3]) -> Vec3 {
-    let (mut lo, mut hi) = (Vec3::repeat(f64::INFINITY), Vec3::repeat(f64::NEG_INFINITY));
-    for p in x {
-        lo = lo.inf(p);
-        hi = hi.sup(p);
-    }
-    // Halves before the sum: no overflow.
-    if x.is_empty() { Vec3::zeros() } else { lo * 0.5 + hi * 0.5 }
+fn first_lanes(count: u32) -> u32 {
+    (1 << count) - 1
 }
 
-fn fill<'a, const N: usize>(
-    blocks: &mut [Block],
+fn bits(lanes: [bool; LANES]) -> u32 {
+    lanes.iter().enumerate().map(|(lane, &set)| u32::from(set) << lane).sum()
+}
+
+fn fill<const ENDS: usize, const N: usize>(
+    blocks: &mut [Block<ENDS>],
     ids: &[[u32; LANES]],
-    vertices: &[MovingBox],
-    corners: impl Fn(usize) -> &'a [u32; N] + Sync,
+    vertices: &[MovingBox<ENDS>],
+    corners: impl Fn(usize) -> [u32; N] + Sync,
 ) {
     blocks.par_chunks_mut(BLOCK_CHUNK).zip(ids.par_chunks(BLOCK_CHUNK)).for_each(|(blocks, ids)| {
         for (block, ids) in blocks.iter_mut().zip(ids) {

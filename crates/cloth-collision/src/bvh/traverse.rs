@@ -1,15 +1,17 @@
-//! The tree against itself: pairs of subtrees whose boxes overlap and that may meet, down to pairs of leaves.
+//! The trees against each other and themselves: pairs of blocks of one level whose boxes overlap, down to leaves.
 
 use super::build::Tree;
+use super::leaf_pair;
 use super::refit::Boxes;
-use super::{Bvh, leaf_pair};
 use crate::CollisionMesh;
-use cloth_mesh::NONE;
+#[cfg(target_arch = "x86_64")]
+use crate::bounds::avx::Avx2;
+use crate::bounds::{Compare, LANES, Plain, lanes};
 use rayon::prelude::*;
 
 pub(super) use leaf_pair::Candidates;
 
-/// The traversal is cut into at least so many tasks where it can be; fixed, so that nothing depends on the number of
+/// The traversal is cut into about so many tasks where it can be; fixed, so that nothing depends on the number of
 /// threads.
 const TASKS: usize = 512;
 /// Candidates wait until there are so many.
@@ -23,17 +25,18 @@ pub(super) struct TraverseCounts {
 }
 
 /// What is done with the pairs of leaves of one task; the visits of all tasks are handed back in their order.
-pub(super) trait Visit: Send {
+pub(super) trait Visit<const ENDS: usize>: Send {
     /// Two leaves whose boxes overlap (or one, twice).
-    fn leaf_pair(&mut self, leaves: &LeafPairs<'_>, a: u32, b: u32);
+    fn leaf_pair(&mut self, leaves: &LeafPairs<'_, ENDS>, a: u32, b: u32);
     /// There is no further pair.
     fn finish(&mut self);
 }
 
 /// The leaves that a [`Visit`] is called with.
-pub(super) struct LeafPairs<'a> {
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LeafPairs<'a, const ENDS: usize> {
     pub(super) tree: &'a Tree,
-    pub(super) boxes: &'a Boxes,
+    pub(super) boxes: &'a Boxes<ENDS>,
 }
 
 /// What is done with candidates.
@@ -54,8 +57,8 @@ impl<S> Streaming<S> {
     }
 }
 
-impl<S: Sink> Visit for Streaming<S> {
-    fn leaf_pair(&mut self, leaves: &LeafPairs<'_>, a: u32, b: u32) {
+impl<const ENDS: usize, S: Sink> Visit<ENDS> for Streaming<S> {
+    fn leaf_pair(&mut self, leaves: &LeafPairs<'_, ENDS>, a: u32, b: u32) {
         leaf_pair::features(leaves.tree, leaves.boxes, a, b, &mut self.candidates);
         if self.candidates.vertex_triangle.len() + self.candidates.edge_edge.len() > FLUSH {
             self.sink.take(&mut self.candidates);
@@ -67,49 +70,53 @@ impl<S: Sink> Visit for Streaming<S> {
     }
 }
 
-struct Walk<'a> {
-    tree: &'a Tree,
-    boxes: &'a Boxes,
+struct Walk<'a, const ENDS: usize> {
+    leaves: LeafPairs<'a, ENDS>,
     mesh: &'a CollisionMesh,
 }
 
-impl Walk<'_> {
-    fn may_meet(&self, a: u32, b: u32) -> bool {
-        let (node_a, node_b) = (&self.tree.nodes[a as usize], &self.tree.nodes[b as usize]);
-        if node_a.body != NONE && node_b.body != NONE && !self.mesh.bodies_meet(node_a.body, node_b.body) {
-            return false;
+impl<const ENDS: usize> Walk<'_, ENDS> {
+    /// Pairs of roots that may meet.
+    fn roots(&self) -> Vec<(u32, u32)> {
+        let LeafPairs { tree, boxes } = self.leaves;
+        let mut pairs = vec![];
+        for (k, a) in tree.roots.iter().enumerate() {
+            for b in &tree.roots[k..] {
+                let active = boxes.lanes[a.block as usize].active | boxes.lanes[b.block as usize].active;
+                if active != 0
+                    && self.mesh.bodies_meet(a.body, b.body)
+                    && boxes.hulls[a.block as usize].overlaps(&boxes.hulls[b.block as usize])
+                {
+                    pairs.push((a.block, b.block));
+                }
+            }
         }
-        (self.boxes.node_active[a as usize] || self.boxes.node_active[b as usize])
-            && (a == b || self.boxes.nodes[a as usize].overlaps(&self.boxes.nodes[b as usize]))
+        pairs
     }
 
     /// Replaces a pair by its children's pairs; false if both are leaves.
-    fn expand(&self, (a, b): (u32, u32), push: &mut impl FnMut((u32, u32))) -> bool {
-        let children = |n: u32| (n + 1, self.tree.nodes[n as usize].right);
-        let is_leaf = |n: u32| self.tree.nodes[n as usize].leaf != NONE;
-        match (is_leaf(a), is_leaf(b)) {
-            (true, true) => return false,
-            _ if a == b => {
-                let (left, right) = children(a);
-                push((left, left));
-                push((left, right));
-                push((right, right));
+    #[inline(always)]
+    fn expand(
+        &self,
+        (a, b): (u32, u32),
+        counts: &mut TraverseCounts,
+        compare: impl Compare,
+        mut push: impl FnMut((u32, u32)),
+    ) -> bool {
+        let LeafPairs { tree, boxes } = self.leaves;
+        let (Some(inner_a), Some(inner_b)) = (tree.inner(a), tree.inner(b)) else { return false };
+        let (block_a, block_b) = (&boxes.blocks[a as usize], &boxes.blocks[b as usize]);
+        let (lanes_a, lanes_b) = (boxes.lanes[a as usize], boxes.lanes[b as usize]);
+        counts.box_tests += u64::from(inner_a.count);
+        for lane in lanes(compare.overlaps(&boxes.hulls[b as usize], block_a) & lanes_a.used) {
+            counts.box_tests += u64::from(inner_b.count);
+            let mut hits = compare.overlaps(&(block_a, lane), block_b);
+            hits &= if lanes_a.active >> lane & 1 == 1 { lanes_b.used } else { lanes_b.active };
+            if a == b {
+                hits &= !0 << lane;
             }
-            (false, false) => {
-                let ((al, ar), (bl, br)) = (children(a), children(b));
-                for pair in [(al, bl), (al, br), (ar, bl), (ar, br)] {
-                    push(pair);
-                }
-            }
-            (true, false) => {
-                let (left, right) = children(b);
-                push((a, left));
-                push((a, right));
-            }
-            (false, true) => {
-                let (left, right) = children(a);
-                push((left, b));
-                push((right, b));
+            for hit in lanes(hits) {
+                push((inner_a.first + lane as u32, inner_b.first + hit as u32));
             }
         }
         true
@@ -117,43 +124,49 @@ impl Walk<'_> {
 
     /// Pairs of subtrees that together hold all pairs of leaves, in a fixed order.
     fn tasks(&self, counts: &mut TraverseCounts) -> Vec<(u32, u32)> {
-        let mut tasks = if self.tree.nodes.is_empty() { vec![] } else { vec![(0, 0)] };
-        loop {
-            let (mut next, mut grew) = (Vec::with_capacity(4 * tasks.len()), false);
+        let mut tasks = self.roots();
+        while !tasks.is_empty() && tasks.len() < TASKS {
+            let mut next = Vec::with_capacity(LANES * tasks.len());
             for &pair in &tasks {
-                let expanded = self.expand(pair, &mut |child| {
-                    counts.box_tests += 1;
-                    if self.may_meet(child.0, child.1) {
-                        next.push(child);
-                    }
-                });
-                grew |= expanded;
-                if !expanded {
-                    next.push(pair);
+                if !self.expand(pair, counts, Plain, |child| next.push(child)) {
+                    // All pairs are of one level: the leaves.
+                    return tasks;
                 }
             }
             tasks = next;
-            if tasks.len() >= TASKS || !grew {
-                return tasks;
-            }
         }
+        tasks
     }
 
-    fn run<V: Visit>(&self, task: (u32, u32), visit: &mut V) -> TraverseCounts {
+    fn run<V: Visit<ENDS>>(&self, tasks: &[(u32, u32)], visit: &mut V) -> TraverseCounts {
+        #[cfg(target_arch = "x86_64")]
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2.
+            return unsafe { self.run_avx2(tasks, visit) };
+        }
+        self.run_with(tasks, visit, Plain)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn run_avx2<V: Visit<ENDS>>(&self, tasks: &[(u32, u32)], visit: &mut V) -> TraverseCounts {
+        // SAFETY: this function runs only where the processor has AVX2.
+        self.run_with(tasks, visit, unsafe { Avx2::new() })
+    }
+
+    #[inline(always)]
+    fn run_with<V: Visit<ENDS>>(
+        &self,
+        tasks: &[(u32, u32)],
+        visit: &mut V,
+        compare: impl Compare,
+    ) -> TraverseCounts {
         let mut counts = TraverseCounts::default();
-        let leaves = LeafPairs { tree: self.tree, boxes: self.boxes };
-        let mut stack = vec![task];
-        while let Some((a, b)) = stack.pop() {
-            let expanded = self.expand((a, b), &mut |child| {
-                counts.box_tests += 1;
-                if self.may_meet(child.0, child.1) {
-                    stack.push(child);
-                }
-            });
-            if !expanded {
+        let mut stack = tasks.to_vec();
+        while let Some(pair) = stack.pop() {
+            if !self.expand(pair, &mut counts, compare, |child| stack.push(child)) {
                 counts.leaf_pairs += 1;
-                let leaf = |n: u32| self.tree.nodes[n as usize].leaf;
-                visit.leaf_pair(&leaves, leaf(a), leaf(b));
+                visit.leaf_pair(&self.leaves, pair.0, pair.1);
             }
         }
         visit.finish();
@@ -161,34 +174,33 @@ impl Walk<'_> {
     }
 }
 
-impl Bvh {
-    /// Meets the tree with itself: one visit per task.
-    pub(super) fn traverse<V: Visit>(
-        &self,
-        mesh: &CollisionMesh,
-        pool: &rayon::ThreadPool,
-        visit: impl Fn() -> V + Sync,
-    ) -> (Vec<V>, TraverseCounts) {
-        let walk = Walk { tree: &self.tree, boxes: &self.boxes, mesh };
-        let mut counts = TraverseCounts::default();
-        let tasks = walk.tasks(&mut counts);
-        let results: Vec<(V, TraverseCounts)> = pool.install(|| {
-            tasks
-                .par_iter()
-                .with_max_len(1)
-                .map(|&task| {
-                    let mut visit = visit();
-                    let counts = walk.run(task, &mut visit);
-                    (visit, counts)
-                })
-                .collect()
-        });
-        let mut visits = Vec::with_capacity(results.len());
-        for (visit, task) in results {
-            counts.box_tests += task.box_tests;
-            counts.leaf_pairs += task.leaf_pairs;
-            visits.push(visit);
-        }
-        (visits, counts)
+/// Meets the trees with each other and themselves: the visits in the order of their tasks.
+pub(super) fn traverse<const ENDS: usize, V: Visit<ENDS>>(
+    tree: &Tree,
+    boxes: &Boxes<ENDS>,
+    mesh: &CollisionMesh,
+    pool: &rayon::ThreadPool,
+    visit: impl Fn() -> V + Sync,
+) -> (Vec<V>, TraverseCounts) {
+    let walk = Walk { leaves: LeafPairs { tree, boxes }, mesh };
+    let mut counts = TraverseCounts::default();
+    let tasks = walk.tasks(&mut counts);
+    let results: Vec<(V, TraverseCounts)> = pool.install(|| {
+        tasks
+            .par_chunks(tasks.len().div_ceil(TASKS).max(1))
+            .with_max_len(1)
+            .map(|tasks| {
+                let mut visit = visit();
+                let counts = walk.run(tasks, &mut visit);
+                (visit, counts)
+            })
+            .collect()
+    });
+    let mut visits = Vec::with_capacity(results.len());
+    for (visit, task) in results {
+        counts.box_tests += task.box_tests;
+        counts.leaf_pairs += task.leaf_pairs;
+        visits.push(visit);
     }
+    (visits, counts)
 }

@@ -1,12 +1,14 @@
 //! Checks of the tree's invariants, for tests.
 
 use super::Bvh;
+use super::build::Tree;
+use super::refit::Boxes;
 use crate::CollisionMesh;
 use crate::bounds::LANES;
 use cloth_mesh::NONE;
 
 impl Bvh {
-    /// Whether the tree holds every triangle, owned vertex and edge once, every node lies below the root once, and,
+    /// Whether the tree holds every triangle, owned vertex and edge once, every block lies below one root once, and,
     /// after a refit, every box holds its children's. O(n), for tests.
     ///
     /// # Errors
@@ -30,37 +32,47 @@ impl Bvh {
         if let Some(v) = (0..seen.len()).find(|&v| seen[v] != u32::from(mesh.vertex_owner[v] != NONE)) {
             return Err(format!("vertex {v} is in {} leaves", seen[v]));
         }
-        let mut parents = vec![0u32; tree.nodes.len()];
-        for (n, node) in tree.nodes.iter().enumerate() {
-            if (node.leaf == NONE) != (node.right != NONE) {
-                return Err(format!("node {n} is neither leaf nor inner node"));
-            }
-            if node.leaf != NONE {
-                if tree.leaves[node.leaf as usize].node as usize != n {
-                    return Err(format!("leaf {} does not name its node {n}", node.leaf));
-                }
-                continue;
-            }
-            for child in [n + 1, node.right as usize] {
-                if child <= n || child >= tree.nodes.len() {
-                    return Err(format!("node {n} has child {child} out of order"));
-                }
-                parents[child] += 1;
-                if let (Some(outer), Some(inner)) = (self.boxes.nodes.get(n), self.boxes.nodes.get(child))
-                    && !outer.contains(inner)
-                {
-                    return Err(format!("box of node {child} leaves that of its parent {n}"));
-                }
-            }
+        let mut parents = vec![0u32; tree.block_count()];
+        for root in &tree.roots {
+            parents[root.block as usize] += 1;
         }
-        if let Some(n) = (1..parents.len()).find(|&n| parents[n] != 1) {
-            return Err(format!("node {n} has {} parents", parents[n]));
+        for (k, inner) in tree.inner.iter().enumerate() {
+            let children = inner.first..inner.first + inner.count;
+            if inner.count == 0 || children.end as usize > tree.leaves.len() + k {
+                return Err(format!("block {} has children {children:?}", tree.leaves.len() + k));
+            }
+            children.for_each(|child| parents[child as usize] += 1);
+        }
+        if let Some(b) = parents.iter().position(|&n| n != 1) {
+            return Err(format!("block {b} has {} parents", parents[b]));
+        }
+        self.moving.validate(tree, mesh)?;
+        self.still.validate(tree, mesh)
+    }
+}
+
+impl<const ENDS: usize> Boxes<ENDS> {
+    fn validate(&self, tree: &Tree, mesh: &CollisionMesh) -> Result<(), String> {
+        if self.hulls.is_empty() {
+            return Ok(());
+        }
+        for (k, inner) in tree.inner.iter().enumerate() {
+            let block = tree.leaves.len() + k;
+            for lane in 0..inner.count {
+                let child = inner.first + lane;
+                let (outer, inside) = (&self.blocks[block].get(lane as usize), &self.hulls[child as usize]);
+                if !outer.contains(inside) || !self.hulls[block].contains(outer) {
+                    return Err(format!("box of block {child} leaves that of its parent {block}"));
+                }
+            }
         }
         for (leaf, ids) in tree.triangle_ids.iter().enumerate() {
-            let Some(bounds) = self.boxes.nodes.get(tree.leaves[leaf].node as usize) else { continue };
-            for &v in ids.iter().filter(|&&t| t != NONE).flat_map(|&t| &mesh.triangles[t as usize]) {
-                if !bounds.contains(&self.boxes.vertices[v as usize]) {
-                    return Err(format!("vertex {v} leaves the box of leaf {leaf}"));
+            for (lane, &t) in ids.iter().enumerate().filter(|&(_, &t)| t != NONE) {
+                let bounds = self.blocks[leaf].get(lane);
+                for v in mesh.triangles[t as usize] {
+                    if !bounds.contains(&self.vertices[v as usize]) || !self.hulls[leaf].contains(&bounds) {
+                        return Err(format!("vertex {v} leaves the box of leaf {leaf}"));
+                    }
                 }
             }
         }
@@ -94,7 +106,7 @@ mod tests {
     #[test]
     fn planted_faults_are_found() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-        let (mesh, x) = strip(50);
+        let (mesh, x) = strip(200);
         let mut good = Bvh::new(&mesh, &x).unwrap();
         good.intersections(&mesh, &x, &pool).unwrap();
         let fault = |plant: &dyn Fn(&mut Bvh)| {
@@ -105,8 +117,9 @@ mod tests {
         assert!(fault(&|b| b.tree.triangle_ids[0][0] = b.tree.triangle_ids[1][0]).contains("triangle"));
         assert!(fault(&|b| b.tree.edge_ids[0][0] = cloth_mesh::NONE).contains("edge"));
         assert!(fault(&|b| b.tree.vertex_ids[0][0] = cloth_mesh::NONE).contains("vertex"));
-        assert!(fault(&|b| b.tree.nodes[0].right += 1).contains("node"));
-        assert!(fault(&|b| b.boxes.nodes[1].hi[1][0] += 1e6).contains("box"));
-        assert!(fault(&|b| b.boxes.vertices[7].lo[0][2] -= 1e6).contains("vertex 7"));
+        assert!(fault(&|b| b.tree.inner[0].first += 1).contains("parents"));
+        assert!(fault(&|b| b.tree.inner[0].count = 0).contains("children"));
+        assert!(fault(&|b| b.still.hulls[1].hi[0][0] += 1e6).contains("box"));
+        assert!(fault(&|b| b.still.vertices[7].lo[0][2] -= 1e6).contains("vertex 7"));
     }
 }

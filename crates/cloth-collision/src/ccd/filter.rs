@@ -165,59 +165,6 @@ fn edge_edge_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
     separated::<L, 4, AT_REST>(&[p[0] - p[2], p[0] - p[3], p[1] - p[2], p[1] - p[3]], thickness)
 }
 
-/// Where a plane through the common vertex (first point) of two triangles certainly has the other corners of one (next
-/// two) on one side of it and those of the other (last two) on the other side: they meet at that vertex only.
-#[inline(always)]
-fn joined_triangles_apart<L: Lanes>(p: &[Vector<L>; 5], _: f64) -> L::Mask {
-    separated::<L, 4, AT_REST>(&[p[1] - p[0], p[2] - p[0], p[0] - p[3], p[0] - p[4]], 0.0)
-}
-
-/// Where two triangles (three points each) certainly have no point in common, by Gilbert's directions.
-#[inline(always)]
-fn triangle_triangle_maybe_apart<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
-    separated::<L, 9, FEW>(&between_triangles(p), 0.0)
-}
-
-/// Where the plane of one of two triangles certainly separates them.
-#[inline(always)]
-fn triangles_beside_planes<L: Lanes>(p: &[Vector<L>; 6], _: f64) -> L::Mask {
-    let d = between_triangles(p);
-    let normals = [(p[1] - p[0]).cross(p[2] - p[0]), (p[4] - p[3]).cross(p[5] - p[3])];
-    let mut extent = d[0].largest();
-    for k in 1..9 {
-        extent = extent.max(d[k].largest());
-    }
-    let zero = L::splat(0.0);
-    let mut apart = zero.greater(zero);
-    for n in normals {
-        let (mut lowest, mut highest) = (n.dot(d[0]), n.dot(d[0]));
-        for k in 1..9 {
-            let g = n.dot(d[k]);
-            lowest = lowest.min(g);
-            highest = highest.max(g);
-        }
-        // As in `separated`: any direction may separate, the normal's own rounding does not matter.
-        let bound = n.sum_of_sizes() * extent * L::splat(ROUNDING) + L::splat(f64::MIN_POSITIVE);
-        apart = apart | lowest.greater(bound) | (zero - bound).greater(highest);
-    }
-    apart
-}
-
-#[inline(always)]
-fn between_triangles<L: Lanes>(p: &[Vector<L>; 6]) -> [Vector<L>; 9] {
-    [
-        p[0] - p[3],
-        p[0] - p[4],
-        p[0] - p[5],
-        p[1] - p[3],
-        p[1] - p[4],
-        p[1] - p[5],
-        p[2] - p[3],
-        p[2] - p[4],
-        p[2] - p[5],
-    ]
-}
-
 /// A point with a fourth entry of no meaning, so that it fills a register.
 pub(crate) type Row = [f64; 4];
 
@@ -270,36 +217,50 @@ four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, ver
 four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart, 8);
 four_at_once!(four_vertex_triangles_beyond, four_vertex_triangles_beyond_avx2, vertex_triangle_beyond, 4);
 four_at_once!(four_edge_edges_beyond, four_edge_edges_beyond_avx2, edge_edge_beyond, 4);
-four_at_once!(four_triangles_maybe_apart, four_triangles_maybe_apart_avx2, triangle_triangle_maybe_apart, 6);
-four_at_once!(four_joined_triangles_apart, four_joined_triangles_apart_avx2, joined_triangles_apart, 5);
-four_at_once!(four_triangles_beside_planes, four_triangles_beside_planes_avx2, triangles_beside_planes, 6);
 
 /// Calls `survivor` with each item that the filter does not reject: `points` names an item's rows, `apart` answers for
-/// four items.
+/// `LANES` items.
 #[inline]
-pub(crate) fn filter<'a, T: Copy, const N: usize>(
+pub(crate) fn filter<'a, T: Copy, R: 'a, const N: usize, const LANES: usize>(
     items: &[T],
-    points: impl Fn(&T) -> [&'a Row; N],
-    apart: impl Fn(&[[&'a Row; N]; 4]) -> u32,
+    points: impl Fn(&T) -> [&'a R; N],
+    apart: impl Fn(&[[&'a R; N]; LANES]) -> u32,
     mut survivor: impl FnMut(T),
 ) {
-    let mut fours = items.chunks_exact(4);
-    for four in &mut fours {
-        let apart = apart(&[points(&four[0]), points(&four[1]), points(&four[2]), points(&four[3])]);
-        for lane in 0..4 {
-            if apart >> lane & 1 == 0 {
-                survivor(four[lane]);
-            }
-        }
-    }
-    let rest = fours.remainder();
-    let Some(last) = rest.last() else { return };
-    let item = |lane: usize| points(rest.get(lane).unwrap_or(last));
-    let apart = apart(&[item(0), item(1), item(2), item(3)]);
-    for (lane, &item) in rest.iter().enumerate() {
+    in_lanes(items, points, apart, |item, apart, lane| {
         if apart >> lane & 1 == 0 {
             survivor(item);
         }
+    });
+}
+
+/// Calls `each` with each item, the answer for its group of `LANES` items and its lane there.
+#[inline]
+pub(crate) fn in_lanes<'a, T: Copy, R: 'a, A: Copy, const N: usize, const LANES: usize>(
+    items: &[T],
+    points: impl Fn(&T) -> [&'a R; N],
+    answer: impl Fn(&[[&'a R; N]; LANES]) -> A,
+    mut each: impl FnMut(T, A, usize),
+) {
+    let (full, rest) = items.as_chunks::<LANES>();
+    for items in full {
+        let mut rows = [points(&items[0]); LANES];
+        for lane in 1..LANES {
+            rows[lane] = points(&items[lane]);
+        }
+        let answer = answer(&rows);
+        for lane in 0..LANES {
+            each(items[lane], answer, lane);
+        }
+    }
+    let Some(last) = rest.last() else { return };
+    let mut rows = [points(last); LANES];
+    for (lane, item) in rest.iter().enumerate() {
+        rows[lane] = points(item);
+    }
+    let answer = answer(&rows);
+    for (lane, &item) in rest.iter().enumerate() {
+        each(item, answer, lane);
     }
 }
 

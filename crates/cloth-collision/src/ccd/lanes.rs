@@ -1,4 +1,4 @@
-//! Several pairs at once: the arithmetic of the filters over one or four lanes, bit for bit the same.
+//! Several pairs at once: the arithmetic of the filters over one or several lanes, bit for bit the same.
 
 use crate::Vec3;
 use std::ops::{Add, BitAnd, BitOr, Mul, Sub};
@@ -20,38 +20,44 @@ pub(crate) trait Lanes:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 }
 
-impl Lanes for f64 {
-    type Mask = bool;
+macro_rules! one_lane {
+    ($type:ident) => {
+        impl Lanes for $type {
+            type Mask = bool;
 
-    #[inline(always)]
-    fn splat(x: f64) -> Self {
-        x
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        f64::abs(self)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        f64::sqrt(self)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        if self < other { self } else { other }
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        if self > other { self } else { other }
-    }
-    #[inline(always)]
-    fn greater(self, other: Self) -> bool {
-        self > other
-    }
-    #[inline(always)]
-    fn select(mask: bool, yes: Self, no: Self) -> Self {
-        if mask { yes } else { no }
-    }
+            #[inline(always)]
+            fn splat(x: f64) -> Self {
+                x as $type
+            }
+            #[inline(always)]
+            fn abs(self) -> Self {
+                $type::abs(self)
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                $type::sqrt(self)
+            }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                if self < other { self } else { other }
+            }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                if self > other { self } else { other }
+            }
+            #[inline(always)]
+            fn greater(self, other: Self) -> bool {
+                self > other
+            }
+            #[inline(always)]
+            fn select(mask: bool, yes: Self, no: Self) -> Self {
+                if mask { yes } else { no }
+            }
+        }
+    };
 }
+one_lane!(f64);
+one_lane!(f32);
 
 /// Three coordinates in lanes.
 #[derive(Debug, Clone, Copy)]
@@ -114,19 +120,136 @@ impl From<Vec3> for Vector<f64> {
     }
 }
 
-/// Four lanes in an AVX register. Values exist only in functions compiled for AVX2, which the methods are inlined
-/// into.
+/// Four or eight lanes in an AVX register. Values exist only in functions compiled for AVX2, which the methods are
+/// inlined into.
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx {
     use super::Lanes;
     use std::arch::x86_64 as arch;
     use std::ops::{Add, BitAnd, BitOr, Div, Mul, Sub};
 
-    #[derive(Debug, Clone, Copy)]
-    pub(crate) struct Four(arch::__m256d);
+    macro_rules! binary {
+        ($type:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
+            impl $trait for $type {
+                type Output = Self;
+                #[inline(always)]
+                fn $method(self, other: Self) -> Self {
+                    // SAFETY: a value exists only where the processor has AVX2.
+                    Self(unsafe { arch::$intrinsic(self.0, other.0) })
+                }
+            }
+        };
+    }
 
-    #[derive(Debug, Clone, Copy)]
-    pub(crate) struct FourMask(arch::__m256d);
+    macro_rules! lanes {
+        (
+            $type:ident, $mask:ident, $register:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $and:ident,
+            $or:ident, $splat:ident, $andnot:ident, $sqrt:ident, $min:ident, $max:ident, $compare:ident,
+            $blend:ident, $movemask:ident
+        ) => {
+            #[derive(Debug, Clone, Copy)]
+            pub(crate) struct $type(arch::$register);
+
+            #[derive(Debug, Clone, Copy)]
+            pub(crate) struct $mask(arch::$register);
+
+            impl $mask {
+                /// Bit per lane.
+                #[inline(always)]
+                pub(crate) fn bits(self) -> u32 {
+                    // SAFETY: a mask exists only where the processor has AVX2.
+                    unsafe { arch::$movemask(self.0) as u32 }
+                }
+            }
+
+            binary!($type, Add, add, $add);
+            binary!($type, Sub, sub, $sub);
+            binary!($type, Mul, mul, $mul);
+            binary!($type, Div, div, $div);
+            binary!($mask, BitAnd, bitand, $and);
+            binary!($mask, BitOr, bitor, $or);
+
+            // SAFETY of the blocks below: values exist only where the processor has AVX2; `splat` is called only
+            // from there.
+            impl Lanes for $type {
+                type Mask = $mask;
+
+                #[inline(always)]
+                fn splat(x: f64) -> Self {
+                    // SAFETY: see above.
+                    Self(unsafe { arch::$splat(x as _) })
+                }
+                #[inline(always)]
+                fn abs(self) -> Self {
+                    // SAFETY: see above.
+                    Self(unsafe { arch::$andnot(arch::$splat(-0.0), self.0) })
+                }
+                #[inline(always)]
+                fn sqrt(self) -> Self {
+                    // SAFETY: see above.
+                    Self(unsafe { arch::$sqrt(self.0) })
+                }
+                #[inline(always)]
+                fn min(self, other: Self) -> Self {
+                    // SAFETY: see above.
+                    Self(unsafe { arch::$min(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn max(self, other: Self) -> Self {
+                    // SAFETY: see above.
+                    Self(unsafe { arch::$max(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn greater(self, other: Self) -> $mask {
+                    // SAFETY: see above.
+                    $mask(unsafe { arch::$compare::<{ arch::_CMP_GT_OQ }>(self.0, other.0) })
+                }
+                #[inline(always)]
+                fn select(mask: $mask, yes: Self, no: Self) -> Self {
+                    // SAFETY: see above.
+                    Self(unsafe { arch::$blend(no.0, yes.0, mask.0) })
+                }
+            }
+        };
+    }
+    lanes!(
+        Four,
+        FourMask,
+        __m256d,
+        _mm256_add_pd,
+        _mm256_sub_pd,
+        _mm256_mul_pd,
+        _mm256_div_pd,
+        _mm256_and_pd,
+        _mm256_or_pd,
+        _mm256_set1_pd,
+        _mm256_andnot_pd,
+        _mm256_sqrt_pd,
+        _mm256_min_pd,
+        _mm256_max_pd,
+        _mm256_cmp_pd,
+        _mm256_blendv_pd,
+        _mm256_movemask_pd
+    );
+    lanes!(
+        Eight,
+        EightMask,
+        __m256,
+        _mm256_add_ps,
+        _mm256_sub_ps,
+        _mm256_mul_ps,
+        _mm256_div_ps,
+        _mm256_and_ps,
+        _mm256_or_ps,
+        _mm256_set1_ps,
+        _mm256_andnot_ps,
+        _mm256_sqrt_ps,
+        _mm256_min_ps,
+        _mm256_max_ps,
+        _mm256_cmp_ps,
+        _mm256_blendv_ps,
+        _mm256_movemask_ps
+    );
 
     impl Four {
         /// The first three entries of four rows, by entry.
@@ -154,72 +277,28 @@ pub(crate) mod avx {
         }
     }
 
-    impl FourMask {
-        /// Bit per lane.
+    impl Eight {
+        /// The first three entries of eight rows, by entry.
+        ///
+        /// # Safety
+        /// The processor has AVX2.
         #[inline(always)]
-        pub(crate) fn bits(self) -> u32 {
-            // SAFETY: a mask exists only where the processor has AVX2.
-            unsafe { arch::_mm256_movemask_pd(self.0) as u32 }
-        }
-    }
-
-    macro_rules! binary {
-        ($type:ident, $trait:ident, $method:ident, $intrinsic:ident) => {
-            impl $trait for $type {
-                type Output = Self;
-                #[inline(always)]
-                fn $method(self, other: Self) -> Self {
-                    // SAFETY: a value exists only where the processor has AVX2.
-                    Self(unsafe { arch::$intrinsic(self.0, other.0) })
-                }
+        pub(crate) unsafe fn load_transposed(rows: [&[f32; 4]; 8]) -> [Self; 3] {
+            // SAFETY: 16 readable bytes in each row; AVX2 by the caller's promise.
+            unsafe {
+                let pair = |low: &[f32; 4], high: &[f32; 4]| {
+                    arch::_mm256_set_m128(arch::_mm_loadu_ps(high.as_ptr()), arch::_mm_loadu_ps(low.as_ptr()))
+                };
+                let (a, b) = (pair(rows[0], rows[4]), pair(rows[1], rows[5]));
+                let (c, d) = (pair(rows[2], rows[6]), pair(rows[3], rows[7]));
+                let (ab_xy, ab_z) = (arch::_mm256_unpacklo_ps(a, b), arch::_mm256_unpackhi_ps(a, b));
+                let (cd_xy, cd_z) = (arch::_mm256_unpacklo_ps(c, d), arch::_mm256_unpackhi_ps(c, d));
+                [
+                    Self(arch::_mm256_shuffle_ps::<0x44>(ab_xy, cd_xy)),
+                    Self(arch::_mm256_shuffle_ps::<0xee>(ab_xy, cd_xy)),
+                    Self(arch::_mm256_shuffle_ps::<0x44>(ab_z, cd_z)),
+                ]
             }
-        };
-    }
-    binary!(Four, Add, add, _mm256_add_pd);
-    binary!(Four, Sub, sub, _mm256_sub_pd);
-    binary!(Four, Mul, mul, _mm256_mul_pd);
-    binary!(Four, Div, div, _mm256_div_pd);
-    binary!(FourMask, BitAnd, bitand, _mm256_and_pd);
-    binary!(FourMask, BitOr, bitor, _mm256_or_pd);
-
-    // SAFETY of the blocks below: values exist only where the processor has AVX2; `splat` is called only from there.
-    impl Lanes for Four {
-        type Mask = FourMask;
-
-        #[inline(always)]
-        fn splat(x: f64) -> Self {
-            // SAFETY: see above.
-            Self(unsafe { arch::_mm256_set1_pd(x) })
-        }
-        #[inline(always)]
-        fn abs(self) -> Self {
-            // SAFETY: see above.
-            Self(unsafe { arch::_mm256_andnot_pd(arch::_mm256_set1_pd(-0.0), self.0) })
-        }
-        #[inline(always)]
-        fn sqrt(self) -> Self {
-            // SAFETY: see above.
-            Self(unsafe { arch::_mm256_sqrt_pd(self.0) })
-        }
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            // SAFETY: see above.
-            Self(unsafe { arch::_mm256_min_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            // SAFETY: see above.
-            Self(unsafe { arch::_mm256_max_pd(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn greater(self, other: Self) -> FourMask {
-            // SAFETY: see above.
-            FourMask(unsafe { arch::_mm256_cmp_pd::<{ arch::_CMP_GT_OQ }>(self.0, other.0) })
-        }
-        #[inline(always)]
-        fn select(mask: FourMask, yes: Self, no: Self) -> Self {
-            // SAFETY: see above.
-            Self(unsafe { arch::_mm256_blendv_pd(no.0, yes.0, mask.0) })
         }
     }
 }

@@ -15,7 +15,7 @@
 mod cubic;
 mod edge_edge;
 pub(crate) mod filter;
-mod lanes;
+pub(crate) mod lanes;
 mod separation;
 mod vertex_triangle;
 

@@ -1,5 +1,7 @@
 //! Triangles that pass through each other, decided exactly.
 
+pub(crate) mod filter;
+
 use crate::{Bvh, CollisionMesh, DetectError, Vec3};
 use robust::{Coord, Coord3D, orient2d, orient3d};
 use std::borrow::Cow;
