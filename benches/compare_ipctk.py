@@ -1,4 +1,4 @@
-"""Detection beside IPC Toolkit on the published frame pairs, in one run.
+"""Detection beside IPC Toolkit on the published frame pairs, and intersections also on sheets, in one run.
 
 Usage: ``python benches/compare_ipctk.py [--repeats N] [--scenes NAME ...] [--json FILE]``. Needs ``clothsim``,
 ``numpy`` and ``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA`` or
@@ -13,6 +13,8 @@ What is timed, per scene, medians over the repeats, rounds interleaved so that a
   candidates, for which its Python face has no call: it is the same loop, with each search cut off at the
   earliest impact so far.
 * IPC Toolkit ``has_intersections``, 1 and 2 threads: whether there is any.
+
+The sheets (92,450 triangles: flat, curved, crumpled) do not intersect; only intersections are timed on them.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import ipctk
@@ -32,6 +35,7 @@ import numpy as np
 
 import clothsim as cs
 
+SHEETS = ("flat", "curved", "crumpled")
 SCENES = ("cloth-ball", "cloth-funnel", "n-body-simulation")
 
 
@@ -52,12 +56,45 @@ def seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
+def sheet(shape: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions [m] and triangles of a 1 m sheet without intersections."""
+    n = 216
+    v, u = (axis.ravel() for axis in np.meshgrid(*[np.linspace(0.0, 1.0, n)] * 2, indexing="ij"))
+    height = {
+        "flat": 0.0 * u,
+        "curved": 0.2 * np.sin(7 * u) * np.cos(5 * v),
+        "crumpled": 0.03 * np.sin(60 * u + 20 * v)
+        + 0.02 * np.cos(47 * v - 31 * u)
+        + 0.01 * np.sin(150 * u) * np.cos(130 * v),
+    }[shape]
+    index = np.arange(n * n, dtype=np.int32).reshape(n, n)
+    a, b, c, d = (corner.ravel() for corner in (index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]))
+    triangles = np.stack([np.stack([a, c, b], axis=1), np.stack([b, c, d], axis=1)], axis=1).reshape(-1, 3)
+    return np.stack([u, height, v], axis=1), triangles
+
+
+def measure_intersections(
+    x: np.ndarray, triangles: np.ndarray, mesh: ipctk.CollisionMesh, threads: int, note: Callable[[str, float], None]
+) -> None:
+    """Time both libraries' intersections once."""
+    note(
+        f"self_intersections, {threads}",
+        seconds(lambda: cs.collision.self_intersections(x, triangles, threads=threads)),
+    )
+    columns = np.asfortranarray(x)
+    ipctk.set_num_threads(threads)
+    note(f"ipctk has_intersections, {threads}", seconds(lambda: ipctk.has_intersections(mesh, columns)))
+
+
 def measure(scene: str, repeats: int) -> dict[str, list[float]]:
     """Time everything on one scene."""
-    z = np.load(data_folder() / f"{scene}.npz")
-    x0, x1, triangles = z["V0"], z["V1"], z["F"]
+    if scene in SHEETS:
+        x0, triangles = sheet(scene)
+        x1 = None
+    else:
+        z = np.load(data_folder() / f"{scene}.npz")
+        x0, x1, triangles = z["V0"], z["V1"], z["F"]
     mesh = ipctk.CollisionMesh(x0, ipctk.edges(triangles), triangles)
-    f0, f1 = np.asfortranarray(x0), np.asfortranarray(x1)
     times: dict[str, list[float]] = {}
 
     def note(name: str, value: float) -> None:
@@ -65,18 +102,14 @@ def measure(scene: str, repeats: int) -> dict[str, list[float]]:
 
     for _ in range(repeats):
         for threads in (1, 2):
-            note(f"detect, {threads}", seconds(lambda t=threads: cs.collision.detect(x0, x1, triangles, threads=t)))
-            note(
-                f"self_intersections, {threads}",
-                seconds(lambda t=threads: cs.collision.self_intersections(x0, triangles, threads=t)),
-            )
-            ipctk.set_num_threads(threads)
-            note(f"ipctk has_intersections, {threads}", seconds(lambda: ipctk.has_intersections(mesh, f0)))
+            measure_intersections(x0, triangles, mesh, threads, note)
+            if x1 is None:
+                continue
+            note(f"detect, {threads}", seconds(partial(cs.collision.detect, x0, x1, triangles, threads=threads)))
+            ends = np.asfortranarray(x0), np.asfortranarray(x1)
             candidates = ipctk.Candidates()
-            build = seconds(lambda c=candidates: c.build(mesh, f0, f1, 0.0, ipctk.LBVH()))
-            search = seconds(
-                lambda c=candidates: c.compute_collision_free_stepsize(mesh, f0, f1, 0.0, ipctk.AdditiveCCD())
-            )
+            build = seconds(partial(candidates.build, mesh, *ends, 0.0, ipctk.LBVH()))
+            search = seconds(partial(candidates.compute_collision_free_stepsize, mesh, *ends, 0.0, ipctk.AdditiveCCD()))
             note(f"ipctk LBVH, {threads}", build)
             note(f"ipctk earliest impact, {threads}", search)
             note(f"ipctk LBVH + earliest impact, {threads}", build + search)
@@ -96,8 +129,9 @@ def main() -> None:
     """Measure and print one table."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--repeats", type=int, default=5, help="rounds (default 5)")
+    both = SCENES + SHEETS
     parser.add_argument(
-        "--scenes", nargs="*", default=["cloth-ball"], choices=SCENES, metavar="NAME", help="frame pairs"
+        "--scenes", nargs="*", default=["cloth-ball", *SHEETS], choices=both, metavar="NAME", help="frame pairs, sheets"
     )
     parser.add_argument("--json", type=Path, help="also write all times [s] to this file")
     options = parser.parse_args()
@@ -121,6 +155,8 @@ def main() -> None:
         for name, values in times.items():
             print(f"  {name:<36}{statistics.median(values) * 1e3:9.1f}{min(values) * 1e3:9.1f}{max(values) * 1e3:9.1f}")
         for theirs, ours in pairs:
+            if ours not in times:
+                continue
             ratio = statistics.median(times[theirs]) / statistics.median(times[ours])
             print(f"  {theirs} / {ours}: {ratio:.1f}")
         print()
