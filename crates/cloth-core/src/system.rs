@@ -1,10 +1,12 @@
 //! All force models of all cloth of a scene.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use crate::{
     Bending, CoreError, EffectInfo, Energy, Environment, InPlane, Material,
-    assembly::{Corners, ELEMENTS_PER_CHUNK, ForceClock, ROWS_PER_CHUNK, timed},
+    assembly::{Corners, ELEMENTS_PER_CHUNK, ForceClock, ROWS_PER_CHUNK, part, parts_mut, timed},
     bending::{BendingLaw, HingeState, Linear},
     forces::{
         ForceModel,
@@ -38,6 +40,10 @@ pub struct ClothSystem {
     wind: Vec3,
     air_damping: f64,
     models: Vec<Box<dyn ForceModel>>,
+    /// What the elements of each model remember.
+    memory: Vec<Vec<f64>>,
+    /// Whether a motion has been accepted that memory has not moved on to yet.
+    moved: bool,
     /// First entry of `corner_refs` of each vertex.
     corner_offsets: Vec<u32>,
     /// Corners of each vertex, over all models in order.
@@ -95,7 +101,9 @@ impl ClothSystem {
             gravity: env.gravity,
             wind: env.wind,
             air_damping: env.air_damping,
+            memory: models.iter().map(|m| m.unused()).collect(),
             models,
+            moved: false,
             corner_offsets,
             corner_refs,
             apart: None,
@@ -104,8 +112,10 @@ impl ClothSystem {
 
     /// Moves all models that resist bending into a system of their own, [`Self::apart`].
     pub(crate) fn split_bending(&mut self) {
-        let (models, rest) = std::mem::take(&mut self.models).into_iter().partition(|m| m.bends());
+        let (models, rest): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.models).into_iter().partition(|m| m.bends());
         self.models = rest;
+        self.memory = self.models.iter().map(|m| m.unused()).collect();
         (self.corner_offsets, self.corner_refs) = corners_by_vertex(&self.models, self.masses.len());
         let (corner_offsets, corner_refs) = corners_by_vertex(&models, self.masses.len());
         self.apart = Some(Box::new(Self {
@@ -113,7 +123,9 @@ impl ClothSystem {
             gravity: Vec3::zeros(),
             wind: Vec3::zeros(),
             air_damping: 0.0,
+            memory: models.iter().map(|m| m.unused()).collect(),
             models,
+            moved: false,
             corner_offsets,
             corner_refs,
             apart: None,
@@ -125,29 +137,46 @@ impl ClothSystem {
         self.apart.as_deref()
     }
 
-    /// All models: those stepped together, then those apart.
-    fn all_models(&self) -> impl Iterator<Item = &dyn ForceModel> {
-        self.models.iter().chain(self.apart.iter().flat_map(|apart| &apart.models)).map(AsRef::as_ref)
+    /// The system itself and what steps apart.
+    fn groups(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.apart())
     }
 
-    fn all_models_mut(&mut self) -> impl Iterator<Item = &mut Box<dyn ForceModel>> {
-        self.models.iter_mut().chain(self.apart.iter_mut().flat_map(|apart| &mut apart.models))
+    /// All models with their memory: those stepped together, then those apart.
+    fn all_models(&self) -> impl Iterator<Item = (&dyn ForceModel, &[f64])> {
+        self.groups().flat_map(|g| g.models.iter().zip(&g.memory).map(|(m, memory)| (&**m, &memory[..])))
     }
 
     /// Whether any law remembers the path that led to a state.
     pub fn remembers(&self) -> bool {
-        self.all_models().any(|m| !m.memory().is_empty())
+        self.all_models().any(|(_, memory)| !memory.is_empty())
     }
 
-    /// What laws with memory remember of the path so far: with positions and velocities, the whole state. Empty where no
-    /// material asks for memory.
-    pub fn memory(&self) -> Vec<f64> {
-        self.all_models().flat_map(|m| m.memory()).copied().collect()
+    /// What laws with memory remember of the path that ends at the accepted positions `x` [m]: with positions and
+    /// velocities, the whole state. Empty where no material asks for memory.
+    pub fn memory(&self, x: &[Vec3]) -> Vec<f64> {
+        self.memory_by_model(x).into_iter().flat_map(Cow::into_owned).collect()
     }
 
-    /// Each hinge of a law with memory as it stands.
-    pub fn hinge_states(&self) -> Vec<HingeState> {
-        self.all_models().flat_map(ForceModel::hinge_states).collect()
+    /// The memory of each model, moved on to `x` if an accepted motion waits for it.
+    fn memory_by_model(&self, x: &[Vec3]) -> Vec<Cow<'_, [f64]>> {
+        let mut list = Vec::new();
+        for group in self.groups() {
+            for (model, memory) in group.models.iter().zip(&group.memory) {
+                let mut memory = Cow::Borrowed(&memory[..]);
+                if group.moved && !memory.is_empty() {
+                    model.accept(0..model.count(), x, memory.to_mut());
+                }
+                list.push(memory);
+            }
+        }
+        list
+    }
+
+    /// Each hinge of a law with memory as it stands at the accepted positions `x` [m].
+    pub fn hinge_states(&self, x: &[Vec3]) -> Vec<HingeState> {
+        let memory = self.memory_by_model(x);
+        self.all_models().zip(&memory).flat_map(|((model, _), memory)| model.hinge_states(memory)).collect()
     }
 
     /// Puts back what [`Self::memory`] gave.
@@ -155,28 +184,55 @@ impl ClothSystem {
     /// # Errors
     /// [`CoreError::Length`], [`CoreError::NotFinite`].
     pub fn set_memory(&mut self, memory: &[f64]) -> Result<(), CoreError> {
-        let expected = self.all_models().map(|m| m.memory().len()).sum();
+        let expected = self.all_models().map(|(_, memory)| memory.len()).sum();
         if memory.len() != expected {
             return Err(CoreError::Length { name: "memory", expected, got: memory.len() });
         }
         if let Some(index) = memory.iter().position(|m| !m.is_finite()) {
             return Err(CoreError::NotFinite { name: "memory", index, got: memory[index] });
         }
+        let Self { memory: own, apart, moved, .. } = self;
+        *moved = false;
+        let others = apart.iter_mut().flat_map(|apart| {
+            apart.moved = false;
+            &mut apart.memory
+        });
         let mut rest = memory;
-        for model in self.all_models_mut() {
+        for to in own.iter_mut().chain(others) {
             let mine;
-            let to = model.memory_mut();
             (mine, rest) = rest.split_at(to.len());
             to.copy_from_slice(mine);
         }
         Ok(())
     }
 
-    /// Takes the motion from the last accepted positions to `x` [m] as done: laws with memory move on. Call on the pool.
-    pub(crate) fn accept(&mut self, x: &[Vec3]) {
-        for model in self.all_models_mut() {
-            model.accept(x);
+    /// Marks the motion to the positions of the next step's start as done. Laws with memory move on when that step first
+    /// looks at them: by [`Self::settle`], or as they are linearised.
+    pub(crate) fn accept(&mut self) {
+        self.moved = true;
+        if let Some(apart) = &mut self.apart {
+            apart.moved = true;
         }
+    }
+
+    /// Lets laws with memory move on to `x` if an accepted motion waits for it. Call on the pool.
+    pub(crate) fn settle(&mut self, x: &[Vec3]) {
+        if std::mem::take(&mut self.moved) {
+            for (model, memory) in self.models.iter().zip(&mut self.memory).filter(|(_, m)| !m.is_empty()) {
+                parts_mut(memory, model.count()).into_par_iter().enumerate().for_each(|(chunk, memory)| {
+                    let start = chunk * ELEMENTS_PER_CHUNK;
+                    model.accept(start..(start + ELEMENTS_PER_CHUNK).min(model.count()), x, memory);
+                });
+            }
+        }
+        if let Some(apart) = &mut self.apart {
+            apart.settle(x);
+        }
+    }
+
+    /// Models, their memory to be moved on, and whether an accepted motion waits for that, which is then taken as done.
+    pub(crate) fn models_to_settle(&mut self) -> (&[Box<dyn ForceModel>], &mut [Vec<f64>], bool) {
+        (&self.models, &mut self.memory, std::mem::take(&mut self.moved))
     }
 
     /// Number of cloth vertices.
@@ -189,11 +245,11 @@ impl ClothSystem {
         &self.masses
     }
 
-    /// Energies of a state (positions [m], velocities [m/s]).
+    /// Energies of an accepted state (positions [m], velocities [m/s]).
     pub fn energy(&self, x: &[Vec3], v: &[Vec3]) -> Energy {
         let mut energy = Energy::default();
-        for model in self.all_models() {
-            model.add_energy(0..model.count(), x, &mut energy);
+        for ((model, _), memory) in self.all_models().zip(self.memory_by_model(x)) {
+            model.add_energy(0..model.count(), x, &memory, &mut energy);
         }
         for ((m, x), v) in self.masses.iter().zip(x).zip(v) {
             energy.kinetic += 0.5 * m * v.norm_squared();
@@ -217,7 +273,7 @@ impl ClothSystem {
 
     /// What is built, in the order in which it is evaluated.
     pub fn effects(&self) -> Vec<EffectInfo> {
-        let mut effects: Vec<_> = self.all_models().map(ForceModel::info).collect();
+        let mut effects: Vec<_> = self.all_models().map(|(model, _)| model.info()).collect();
         let elements = self.vertex_count();
         if self.gravity != Vec3::zeros() {
             effects.push(EffectInfo { name: "gravity", elements, bytes: 0 });
@@ -250,6 +306,11 @@ impl ClothSystem {
         &self.models
     }
 
+    /// What the elements of each model remember.
+    pub(crate) fn settled_memory(&self) -> &[Vec<f64>] {
+        &self.memory
+    }
+
     /// Rate c of the damping −c m (v − wind) [1/s].
     pub(crate) fn air_damping(&self) -> f64 {
         self.air_damping
@@ -267,7 +328,7 @@ impl ClothSystem {
 
     /// Forces with work space of the caller's. Call on the pool.
     pub(crate) fn evaluate(&self, corners: &mut Corners, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
-        corners.evaluate(&self.models, x, v);
+        corners.evaluate(&self.models, &self.memory, x, v);
         self.gather(corners, v, 1.0, &mut out[..self.vertex_count()]);
     }
 
@@ -305,7 +366,7 @@ impl ClothSystem {
     /// the gradient of where no model dissipates. Summed by chunks in order. Call on the pool.
     pub(crate) fn potential(&self, x: &[Vec3], v: &[Vec3], dt: f64, clock: &mut ForceClock) -> f64 {
         let mut sum = 0.0;
-        for (model, seconds) in self.models.iter().zip(&mut clock.models) {
+        for ((model, memory), seconds) in self.models.iter().zip(&self.memory).zip(&mut clock.models) {
             let count = model.count();
             let parts: Vec<f64> = timed(seconds, || {
                 (0..count.div_ceil(ELEMENTS_PER_CHUNK))
@@ -313,7 +374,8 @@ impl ClothSystem {
                     .map(|chunk| {
                         let start = chunk * ELEMENTS_PER_CHUNK;
                         let mut energy = Energy::default();
-                        model.add_energy(start..(start + ELEMENTS_PER_CHUNK).min(count), x, &mut energy);
+                        let range = start..(start + ELEMENTS_PER_CHUNK).min(count);
+                        model.add_energy(range.clone(), x, part(memory, count, range), &mut energy);
                         energy.elastic()
                     })
                     .collect()

@@ -25,7 +25,7 @@ impl Simulation {
         payload.points(&self.state.x);
         payload.points(&self.state.v);
         payload.points(&self.state.contact_force);
-        payload.numbers(&self.integrator.system().memory());
+        payload.numbers(&self.memory());
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
         payload.u64(pending.steps);
         payload.f64(pending.dt);

@@ -262,7 +262,12 @@ impl Simulation {
 
     /// Each hinge of a bending law with memory as it stands; none where no material asks for memory.
     pub fn hinges(&self) -> Vec<cloth_core::bending::HingeState> {
-        self.integrator.system().hinge_states()
+        self.integrator.system().hinge_states(&self.state.x)
+    }
+
+    /// What bending laws remember of the path so far.
+    pub(crate) fn memory(&self) -> Vec<f64> {
+        self.integrator.system().memory(&self.state.x)
     }
 
     /// Which effects run and why.

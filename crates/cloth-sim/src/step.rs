@@ -233,7 +233,7 @@ impl Simulation {
             };
             self.state.contact_force = (0..v.len()).map(force).collect();
         }
-        self.integrator.accept(&x);
+        self.integrator.accept();
         self.state.x = x;
         self.state.v = v;
         self.state.time = t1;
@@ -273,8 +273,8 @@ impl Simulation {
     ) -> Result<StepInfo, Failure> {
         let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
         let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(|error| match error {
-            StepError::Solver(error) => {
-                Failure::Alarm(Alarm { reason: error.to_string(), vertices: Vec::new() })
+            StepError::Solver { error, vertices } => {
+                Failure::Alarm(Alarm { reason: error.to_string(), vertices })
             }
             other => Failure::Stop(stage("dynamics", &other)),
         })?;
@@ -430,14 +430,14 @@ pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = 
                 straight.step_to(end, step.dt / f64::from(substeps)).unwrap();
             }
         }
-        let memory = retried.integrator.system().memory();
-        assert_eq!(memory, straight.integrator.system().memory());
+        let memory = retried.memory();
+        assert_eq!(memory, straight.memory());
         assert_eq!(retried.state.x, straight.state.x);
         let mut whole = remembering();
         for _ in 0..5 {
             whole.step().unwrap();
         }
-        assert_ne!(memory, whole.integrator.system().memory(), "the comparison sees a difference");
+        assert_ne!(memory, whole.memory(), "the comparison sees a difference");
         assert!(memory.iter().any(|m| *m != 0.0));
     }
 
@@ -450,7 +450,7 @@ pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = 
         let mut resumed = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
         assert_eq!(resumed.hinges(), sim.hinges());
         let mut forgetful = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
-        let nothing = remembering().integrator.system().memory();
+        let nothing = remembering().memory();
         forgetful.integrator.set_memory(&nothing).unwrap();
         for _ in 0..30 {
             for sim in [&mut sim, &mut resumed, &mut forgetful] {

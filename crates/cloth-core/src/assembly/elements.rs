@@ -1,5 +1,7 @@
 //! What elements write: corner forces and couplings, in arrays per model.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::{ELEMENTS_PER_CHUNK, ForceClock, timed};
@@ -21,6 +23,20 @@ pub(crate) struct Corners {
     pub(crate) clock: ForceClock,
 }
 
+/// The memory of a range of a model's `count` elements.
+pub(crate) fn part(memory: &[f64], count: usize, range: Range<usize>) -> &[f64] {
+    let words = memory.len() / count.max(1);
+    &memory[words * range.start..words * range.end]
+}
+
+/// The memory of each chunk of a model's `count` elements; empty parts for a law without memory.
+pub(crate) fn parts_mut(memory: &mut [f64], count: usize) -> Vec<&mut [f64]> {
+    if memory.is_empty() {
+        return (0..count.div_ceil(ELEMENTS_PER_CHUNK)).map(|_| &mut [][..]).collect();
+    }
+    memory.chunks_mut(memory.len() / count * ELEMENTS_PER_CHUNK).collect()
+}
+
 impl Corners {
     pub(crate) fn new(models: &[Box<dyn ForceModel>]) -> Self {
         Self {
@@ -30,16 +46,23 @@ impl Corners {
     }
 
     /// Evaluates the forces of all models. Call on the pool.
-    pub(crate) fn evaluate(&mut self, models: &[Box<dyn ForceModel>], x: &[Vec3], v: &[Vec3]) {
+    pub(crate) fn evaluate(
+        &mut self,
+        models: &[Box<dyn ForceModel>],
+        memory: &[Vec<f64>],
+        x: &[Vec3],
+        v: &[Vec3],
+    ) {
         let mut forces = self.forces.as_mut_slice();
-        for (model, seconds) in models.iter().zip(&mut self.clock.models) {
+        for ((model, memory), seconds) in models.iter().zip(memory).zip(&mut self.clock.models) {
             let corners = model.corners();
             let mine;
             (mine, forces) = std::mem::take(&mut forces).split_at_mut(model.vertices().len());
             timed(seconds, || {
                 mine.par_chunks_mut(ELEMENTS_PER_CHUNK * corners).enumerate().for_each(|(chunk, out)| {
                     let start = chunk * ELEMENTS_PER_CHUNK;
-                    model.forces(start..start + out.len() / corners, x, v, out);
+                    let range = start..start + out.len() / corners;
+                    model.forces(range.clone(), x, v, part(memory, model.count(), range), out);
                 });
             });
         }
@@ -67,6 +90,7 @@ impl ElementBuffers {
     pub(crate) fn linearise(
         &mut self,
         models: &[Box<dyn ForceModel>],
+        memory: &mut [Vec<f64>],
         corners: &mut Corners,
         x: &[Vec3],
         v: &[Vec3],
@@ -75,11 +99,12 @@ impl ElementBuffers {
         let mut forces = corners.forces.as_mut_slice();
         let (mut blocks, mut outer, mut diagonal) =
             (self.blocks.as_mut_slice(), self.outer.as_mut_slice(), self.diagonal.as_mut_slice());
-        for (model, seconds) in models.iter().zip(&mut corners.clock.models) {
+        for ((model, memory), seconds) in models.iter().zip(memory).zip(&mut corners.clock.models) {
             let n = model.corners();
             let f;
             (f, forces) = std::mem::take(&mut forces).split_at_mut(model.vertices().len());
-            let f = f.par_chunks_mut(ELEMENTS_PER_CHUNK * n).enumerate();
+            let memory = parts_mut(memory, model.count());
+            let f = f.par_chunks_mut(ELEMENTS_PER_CHUNK * n).enumerate().zip(memory);
             let range = |chunk: usize, f: &[Vec3]| {
                 let start = chunk * ELEMENTS_PER_CHUNK;
                 start..start + f.len() / n
@@ -90,23 +115,23 @@ impl ElementBuffers {
                     let mine;
                     (mine, blocks) = std::mem::take(&mut blocks).split_at_mut(model.count() * per_element);
                     f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK * per_element)).for_each(
-                        |((chunk, f), c)| {
-                            model.linearise(range(chunk, f), x, v, linear, f, Couplings::Blocks(c));
+                        |(((chunk, f), memory), c)| {
+                            model.linearise(range(chunk, f), x, v, linear, memory, f, Couplings::Blocks(c));
                         },
                     );
                 }
                 CouplingKind::Outer => {
                     let mine;
                     (mine, outer) = std::mem::take(&mut outer).split_at_mut(model.count());
-                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|((chunk, f), c)| {
-                        model.linearise(range(chunk, f), x, v, linear, f, Couplings::Outer(c));
+                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|(((chunk, f), memory), c)| {
+                        model.linearise(range(chunk, f), x, v, linear, memory, f, Couplings::Outer(c));
                     });
                 }
                 CouplingKind::Diagonal => {
                     let mine;
                     (mine, diagonal) = std::mem::take(&mut diagonal).split_at_mut(model.count());
-                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|((chunk, f), c)| {
-                        model.linearise(range(chunk, f), x, v, linear, f, Couplings::Diagonal(c));
+                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|(((chunk, f), memory), c)| {
+                        model.linearise(range(chunk, f), x, v, linear, memory, f, Couplings::Diagonal(c));
                     });
                 }
             });

@@ -16,7 +16,7 @@ pub(crate) mod simd;
 
 pub(crate) use block_csr::{BlockMatrix, Lanes};
 pub(crate) use clock::{ForceClock, timed};
-pub(crate) use elements::{Corners, ElementBuffers};
+pub(crate) use elements::{Corners, ElementBuffers, part, parts_mut};
 pub(crate) use gather::Assembler;
 pub(crate) use pattern::Pattern;
 

@@ -69,9 +69,9 @@ impl ForceModel for Air {
         true
     }
 
-    fn add_energy(&self, _range: Range<usize>, _x: &[Vec3], _energy: &mut Energy) {}
+    fn add_energy(&self, _range: Range<usize>, _x: &[Vec3], _memory: &[f64], _energy: &mut Energy) {}
 
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
+    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], _memory: &[f64], out: &mut [Vec3]) {
         for (element, f) in range.zip(out.chunks_exact_mut(3)) {
             f.fill(self.corner(element, x, v).0);
         }
@@ -83,6 +83,7 @@ impl ForceModel for Air {
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
+        _memory: &mut [f64],
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {
@@ -101,7 +102,7 @@ mod tests {
     use super::*;
 
     fn triangle(drag: f64, lift: f64, wind: Vec3) -> Model {
-        Box::new(Air { wind, drag, lift, vertices: vec![[0, 1, 2]] })
+        Model::new(Air { wind, drag, lift, vertices: vec![[0, 1, 2]] })
     }
 
     const TRIANGLE: [Vec3; 3] =

@@ -23,13 +23,10 @@
 
 use std::{f64::consts::PI, ops::Range};
 
-use rayon::prelude::*;
-
 use super::{CouplingKind, Couplings, ForceModel, Psd, corner_pairs};
 use crate::{
     CoreError, EffectInfo, Energy,
-    assembly::ELEMENTS_PER_CHUNK,
-    bending::{BendingLaw, HingeState, words},
+    bending::{BendingLaw, HingeState, Moment, words},
     mesh::Vec3,
 };
 
@@ -43,8 +40,6 @@ pub(crate) struct Hinges<L: BendingLaw> {
     damping: f64,
     vertices: Vec<[u32; 4]>,
     rest: Vec<Rest>,
-    /// What each hinge remembers; no memory for laws without.
-    memory: Vec<L::Memory>,
 }
 
 /// Rest data of one hinge.
@@ -75,6 +70,23 @@ struct Angle {
     gradient: [Vec3; 4],
 }
 
+/// What the element `k` of a range remembers.
+#[inline]
+fn read<L: BendingLaw>(memory: &[f64], k: usize) -> L::Memory {
+    if words::<L>() == 0 {
+        return L::Memory::default();
+    }
+    bytemuck::pod_read_unaligned(bytemuck::cast_slice(&memory[k * words::<L>()..][..words::<L>()]))
+}
+
+#[inline]
+fn write<L: BendingLaw>(memory: &mut [f64], k: usize, place: &L::Memory) {
+    if words::<L>() > 0 {
+        memory[k * words::<L>()..][..words::<L>()]
+            .copy_from_slice(bytemuck::cast_slice(std::slice::from_ref(place)));
+    }
+}
+
 /// Signed dihedral angle [rad] of corners (e0, e1, opposite, opposite).
 pub(crate) fn dihedral_angle(x: &[Vec3; 4]) -> f64 {
     let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
@@ -102,8 +114,7 @@ impl<L: BendingLaw> Hinges<L> {
                 }
             }
         }
-        let memory = vec![L::Memory::default(); vertices.len()];
-        Ok(Self { law, damping, vertices, rest, memory })
+        Ok(Self { law, damping, vertices, rest })
     }
 
     /// Change of curvature of a hinge whose angle is `angle` ∈ [−π, π].
@@ -140,6 +151,26 @@ impl<L: BendingLaw> Hinges<L> {
         Angle { value, gradient: [g0, g1, g2, g3] }
     }
 
+    /// Moment and slope at the angle `value`, of the element `k` of a range that turns at `rate` [rad/s].
+    #[inline]
+    fn answer(
+        &self,
+        rest: &Rest,
+        memory: &mut [f64],
+        k: usize,
+        value: f64,
+        rate: f64,
+        accept: bool,
+    ) -> Moment {
+        let mut place = read::<L>(memory, k);
+        let curvature = Self::curvature(rest, &place, value);
+        if accept {
+            self.law.advance(&mut place, curvature);
+            write::<L>(memory, k, &place);
+        }
+        self.law.moment(&place, curvature, rate)
+    }
+
     /// dθ/dx's change along corner motions `d`: the exact second derivative of θ applied to `d`.
     fn gradient_change(rest: &Rest, x: &[Vec3; 4], d: &[Vec3; 4]) -> [Vec3; 4] {
         let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
@@ -173,7 +204,7 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
             elements: self.vertices.len(),
             bytes: size_of_val(self.vertices.as_slice())
                 + size_of_val(self.rest.as_slice())
-                + size_of_val(self.memory.as_slice()),
+                + size_of::<L::Memory>() * self.vertices.len(),
         }
     }
 
@@ -204,51 +235,47 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         self.law.stiffening()
     }
 
-    fn accept(&mut self, x: &[Vec3]) {
+    fn unused(&self) -> Vec<f64> {
         if words::<L>() == 0 {
-            return;
+            return Vec::new();
         }
-        let Self { law, vertices, rest, memory, .. } = self;
-        memory.par_chunks_mut(ELEMENTS_PER_CHUNK).enumerate().for_each(|(chunk, memory)| {
-            for (element, memory) in (chunk * ELEMENTS_PER_CHUNK..).zip(memory) {
-                let angle = dihedral_angle(&vertices[element].map(|i| x[i as usize]));
-                law.advance(memory, Self::curvature(&rest[element], memory, angle));
-            }
-        });
+        bytemuck::cast_slice(&vec![L::Memory::default(); self.vertices.len()]).to_vec()
     }
 
-    fn hinge_states(&self) -> Vec<HingeState> {
-        let state = |(vertices, memory): (&[u32; 4], &L::Memory)| {
-            let curvature = L::last(memory)?;
-            let moment = self.law.moment(memory, curvature, 0.0).moment;
-            Some(HingeState { vertices: *vertices, curvature, moment, place: self.law.place(memory) })
+    fn accept(&self, range: Range<usize>, x: &[Vec3], memory: &mut [f64]) {
+        for (k, element) in range.enumerate() {
+            let angle = dihedral_angle(&self.corners_of(element, x));
+            let mut place = read::<L>(memory, k);
+            let curvature = Self::curvature(&self.rest[element], &place, angle);
+            self.law.advance(&mut place, curvature);
+            write::<L>(memory, k, &place);
+        }
+    }
+
+    fn hinge_states(&self, memory: &[f64]) -> Vec<HingeState> {
+        let state = |(k, vertices): (usize, &[u32; 4])| {
+            let place = read::<L>(memory, k);
+            let curvature = L::last(&place)?;
+            let moment = self.law.moment(&place, curvature, 0.0).moment;
+            Some(HingeState { vertices: *vertices, curvature, moment, place: self.law.place(&place) })
         };
-        self.vertices.iter().zip(&self.memory).filter_map(state).collect()
+        self.vertices.iter().enumerate().filter_map(state).collect()
     }
 
-    fn memory(&self) -> &[f64] {
-        if words::<L>() == 0 { &[] } else { bytemuck::cast_slice(&self.memory) }
-    }
-
-    fn memory_mut(&mut self) -> &mut [f64] {
-        if words::<L>() == 0 { &mut [] } else { bytemuck::cast_slice_mut(&mut self.memory) }
-    }
-
-    fn add_energy(&self, range: Range<usize>, x: &[Vec3], energy: &mut Energy) {
-        for element in range {
-            let rest = &self.rest[element];
-            let memory = &self.memory[element];
-            let curvature = Self::curvature(rest, memory, dihedral_angle(&self.corners_of(element, x)));
-            energy.bending += rest.edge * rest.height * self.law.moment(memory, curvature, 0.0).energy;
+    fn add_energy(&self, range: Range<usize>, x: &[Vec3], memory: &[f64], energy: &mut Energy) {
+        for (k, element) in range.enumerate() {
+            let (rest, place) = (&self.rest[element], read::<L>(memory, k));
+            let curvature = Self::curvature(rest, &place, dihedral_angle(&self.corners_of(element, x)));
+            energy.bending += rest.edge * rest.height * self.law.moment(&place, curvature, 0.0).energy;
         }
     }
 
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
-        for (element, f) in range.zip(out.chunks_exact_mut(4)) {
-            let (rest, memory) = (&self.rest[element], &self.memory[element]);
+    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], memory: &[f64], out: &mut [Vec3]) {
+        for ((k, element), f) in range.enumerate().zip(out.chunks_exact_mut(4)) {
+            let (rest, place) = (&self.rest[element], read::<L>(memory, k));
             let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
-            let curvature = Self::curvature(rest, memory, value);
-            let mut torque = rest.edge * self.law.moment(memory, curvature, 0.0).moment;
+            let curvature = Self::curvature(rest, &place, value);
+            let mut torque = rest.edge * self.law.moment(&place, curvature, 0.0).moment;
             if self.damping > 0.0 {
                 let rate: f64 = (0..4).map(|c| gradient[c].dot(&v[self.vertices[element][c] as usize])).sum();
                 torque += rest.edge * self.damping / rest.height * rate;
@@ -265,6 +292,7 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         x: &[Vec3],
         v: &[Vec3],
         linear: &super::Linear,
+        memory: &mut [f64],
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {
@@ -272,15 +300,16 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         let first = range.start;
         match couplings {
             Couplings::Outer(outer) => {
-                for ((element, f), outer) in range.zip(forces.chunks_exact_mut(4)).zip(outer) {
-                    let (rest, memory) = (&self.rest[element], &self.memory[element]);
+                for (((k, element), f), outer) in range.enumerate().zip(forces.chunks_exact_mut(4)).zip(outer)
+                {
+                    let rest = &self.rest[element];
                     let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
                     let [v0, v1, v2, v3] = self.corners_of(element, v);
                     // Σ g_a = 0, so the rate needs differences only.
                     let rate = gradient[1].dot(&(v1 - v0))
                         + gradient[2].dot(&(v2 - v0))
                         + gradient[3].dot(&(v3 - v0));
-                    let answer = self.law.moment(memory, Self::curvature(rest, memory, value), rate);
+                    let answer = self.answer(rest, memory, k, value, rate, linear.accept);
                     let per_angle = rest.edge / rest.height;
                     // A negative slope has no place in a positive semi-definite block.
                     let stiffness = per_angle * answer.slope.max(0.0);
@@ -294,15 +323,15 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                 }
             }
             Couplings::Blocks(blocks) => {
-                for ((element, f), blocks) in
-                    range.zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
+                for (((k, element), f), blocks) in
+                    range.enumerate().zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
                 {
-                    let (rest, memory) = (&self.rest[element], &self.memory[element]);
+                    let rest = &self.rest[element];
                     let corners = self.corners_of(element, x);
                     let velocity = self.corners_of(element, v);
                     let Angle { value, gradient } = Self::angle(rest, &corners);
                     let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
-                    let answer = self.law.moment(memory, Self::curvature(rest, memory, value), rate);
+                    let answer = self.answer(rest, memory, k, value, rate, linear.accept);
                     let per_angle = rest.edge / rest.height;
                     let (stiffness, damping) = (per_angle * answer.slope, per_angle * damping);
                     let moment = rest.edge * answer.moment;
@@ -360,7 +389,7 @@ mod tests {
 
     fn bent<L: BendingLaw + 'static>(law: L, damping: f64, heights: [f64; 2], rest_angle: f64) -> Model {
         let rest = Rest::new(1.0, heights.map(|h| 0.5 * h), rest_angle);
-        Box::new(Hinges::new(law, damping, vec![[0, 1, 2, 3]], vec![rest]).unwrap())
+        Model::new(Hinges::new(law, damping, vec![[0, 1, 2, 3]], vec![rest]).unwrap())
     }
 
     fn hinge(damping: f64, heights: [f64; 2], rest_angle: f64) -> Model {
@@ -481,14 +510,14 @@ mod tests {
         let heights = [1.0, 0.8];
         let (start, bent) = (folded(0.45, heights), folded(1.2, heights));
         for (what, mut model) in laws_on_the_way(heights, &start) {
-            let (memory, rest) = (model.memory().to_vec(), [Vec3::zeros(); 4]);
+            let (memory, rest) = (model.memory.clone(), [Vec3::zeros(); 4]);
             let before = forces(&model, &start, &rest);
             forces(&model, &bent, &rest);
-            assert_eq!(model.memory(), memory, "{what}");
+            assert_eq!(model.memory, memory, "{what}");
             model.accept(&bent);
-            assert_eq!(model.memory() == memory, memory.is_empty(), "{what}");
+            assert_eq!(model.memory == memory, memory.is_empty(), "{what}");
             assert_eq!(forces(&model, &start, &rest) == before, what == "nonlinear", "{what}");
-            model.memory_mut().copy_from_slice(&memory);
+            model.memory.clone_from(&memory);
             assert_eq!(forces(&model, &start, &rest), before, "{what}");
         }
     }
@@ -515,7 +544,7 @@ mod tests {
 
     #[test]
     fn memory_costs_48_bytes_where_it_is_and_none_elsewhere() {
-        let bytes = |model: &Model| model.info().bytes;
+        let bytes = |model: &Model| model.law.info().bytes;
         let curve = Curve::new(3.0, 1.0, -2.0).unwrap();
         let linear = bytes(&hinge(0.0, [1.0; 2], 0.0));
         assert_eq!(bytes(&bent(curve, 0.0, [1.0; 2], 0.0)), linear);

@@ -69,6 +69,8 @@ pub(crate) struct Linear {
     pub(crate) stiffness: f64,
     /// Corner forces are f + `ahead` · K_x v, with the K_x of the couplings [s].
     pub(crate) ahead: f64,
+    /// Whether `x` has been accepted as the end of a motion: laws with memory then move on to it first.
+    pub(crate) accept: bool,
     pub(crate) psd: Psd,
 }
 
@@ -100,17 +102,18 @@ pub(crate) trait ForceModel: Send + Sync {
     fn vertices(&self) -> &[u32];
     /// Form of the couplings that `linearise` writes.
     fn coupling(&self, psd: Psd) -> CouplingKind;
-    /// Adds the energy of a range of elements [J].
-    fn add_energy(&self, range: Range<usize>, x: &[Vec3], energy: &mut Energy);
+    /// Adds the energy of a range of elements [J]. `memory`: that of the range, here and below.
+    fn add_energy(&self, range: Range<usize>, x: &[Vec3], memory: &[f64], energy: &mut Energy);
     /// Corner forces of a range of elements [N]: `corners` entries per element.
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]);
-    /// Corner forces and couplings of a range of elements.
+    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], memory: &[f64], out: &mut [Vec3]);
+    /// Corner forces and couplings of a range of elements. Memory moves on where [`Linear::accept`] says so.
     fn linearise(
         &self,
         range: Range<usize>,
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
+        memory: &mut [f64],
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     );
@@ -127,21 +130,16 @@ pub(crate) trait ForceModel: Send + Sync {
         1.0
     }
 
-    /// Takes a motion to `x` as done: what elements remember moves on. Nothing else changes it. Call on the pool.
-    fn accept(&mut self, _x: &[Vec3]) {}
-
-    /// What the elements remember, as a checkpoint holds it; empty for laws without memory.
-    fn memory(&self) -> &[f64] {
-        &[]
+    /// Memory of all elements before any motion; empty for laws without.
+    fn unused(&self) -> Vec<f64> {
+        Vec::new()
     }
 
-    /// As [`Self::memory`], to be written by one who resumes.
-    fn memory_mut(&mut self) -> &mut [f64] {
-        &mut []
-    }
+    /// Takes a motion to `x` as done: the memory of a range of elements moves on.
+    fn accept(&self, _range: Range<usize>, _x: &[Vec3], _memory: &mut [f64]) {}
 
     /// Each hinge of a law with memory as it stands; empty for other models.
-    fn hinge_states(&self) -> Vec<HingeState> {
+    fn hinge_states(&self, _memory: &[f64]) -> Vec<HingeState> {
         Vec::new()
     }
 

@@ -117,7 +117,7 @@ impl ForceModel for Springs {
         self.damping > 0.0
     }
 
-    fn add_energy(&self, range: Range<usize>, x: &[Vec3], energy: &mut Energy) {
+    fn add_energy(&self, range: Range<usize>, x: &[Vec3], _memory: &[f64], energy: &mut Energy) {
         let mut sum = 0.0;
         for element in range {
             let [a, b] = self.vertices[element].map(|i| i as usize);
@@ -130,7 +130,7 @@ impl ForceModel for Springs {
         }
     }
 
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], out: &mut [Vec3]) {
+    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], _memory: &[f64], out: &mut [Vec3]) {
         for (element, f) in range.zip(out.chunks_exact_mut(2)) {
             let spring = self.spring(element, x, v);
             f[0] = spring.tension * spring.along;
@@ -144,6 +144,7 @@ impl ForceModel for Springs {
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
+        _memory: &mut [f64],
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {
@@ -194,7 +195,7 @@ mod tests {
 
     fn fan(damping: f64) -> Model {
         let vertices = vec![[0, 1], [2, 0], [1, 2], [3, 2]];
-        Box::new(Springs::new(Role::InPlane, 40.0, damping, vertices, vec![1.0, 0.8, 1.2, 0.5]).unwrap())
+        Model::new(Springs::new(Role::InPlane, 40.0, damping, vertices, vec![1.0, 0.8, 1.2, 0.5]).unwrap())
     }
 
     #[test]
@@ -213,7 +214,7 @@ mod tests {
 
     #[test]
     fn rest_has_no_energy_and_no_force() {
-        let model: Model = Box::new(Springs::new(Role::Bending, 10.0, 0.1, vec![[0, 1]], vec![5.0]).unwrap());
+        let model = Model::new(Springs::new(Role::Bending, 10.0, 0.1, vec![[0, 1]], vec![5.0]).unwrap());
         let x = [Vec3::new(1.0, 1.0, 0.0), Vec3::new(4.0, 5.0, 0.0)];
         assert_eq!(energy(&model, &x), 0.0);
         assert_eq!(forces(&model, &x, &[Vec3::zeros(); 2]), [Vec3::zeros(); 2]);
@@ -223,7 +224,7 @@ mod tests {
     fn value_by_hand() {
         // Length 5, rest 4, k 10, k_d 2, u = (0.6, 0.8, 0), v_1 = (5, 0, 0): w·u = 3.
         // Tension 10·1 + 2·3 = 16, force on corner 0 = (9.6, 12.8, 0); energy ½·10·1² = 5.
-        let model: Model = Box::new(Springs::new(Role::InPlane, 10.0, 2.0, vec![[0, 1]], vec![4.0]).unwrap());
+        let model = Model::new(Springs::new(Role::InPlane, 10.0, 2.0, vec![[0, 1]], vec![4.0]).unwrap());
         let x = [Vec3::zeros(), Vec3::new(3.0, 4.0, 0.0)];
         let f = forces(&model, &x, &[Vec3::zeros(), Vec3::new(5.0, 0.0, 0.0)]);
         assert!((f[0] - Vec3::new(9.6, 12.8, 0.0)).norm() < 1e-13 && f[1] == -f[0]);

@@ -42,19 +42,33 @@ impl Random {
     }
 }
 
-/// A model as the system holds it.
-pub(crate) type Model = Box<dyn ForceModel>;
+/// A model with its memory, as the system holds both.
+pub(crate) struct Model {
+    pub(crate) law: Box<dyn ForceModel>,
+    pub(crate) memory: Vec<f64>,
+}
+
+impl Model {
+    pub(crate) fn new(law: impl ForceModel + 'static) -> Self {
+        let memory = law.unused();
+        Self { law: Box::new(law), memory }
+    }
+
+    pub(crate) fn accept(&mut self, x: &[Vec3]) {
+        self.law.accept(0..self.law.count(), x, &mut self.memory);
+    }
+}
 
 /// Forces per vertex.
 pub(crate) fn forces(model: &Model, x: &[Vec3], v: &[Vec3]) -> Vec<Vec3> {
-    let mut corners = vec![Vec3::zeros(); model.vertices().len()];
-    model.forces(0..model.count(), x, v, &mut corners);
+    let mut corners = vec![Vec3::zeros(); model.law.vertices().len()];
+    model.law.forces(0..model.law.count(), x, v, &model.memory, &mut corners);
     scatter(model, &corners, x.len())
 }
 
 fn scatter(model: &Model, corners: &[Vec3], n: usize) -> Vec<Vec3> {
     let mut out = vec![Vec3::zeros(); n];
-    for (&vertex, f) in model.vertices().iter().zip(corners) {
+    for (&vertex, f) in model.law.vertices().iter().zip(corners) {
         out[vertex as usize] += f;
     }
     out
@@ -62,7 +76,7 @@ fn scatter(model: &Model, corners: &[Vec3], n: usize) -> Vec<Vec3> {
 
 pub(crate) fn energy(model: &Model, x: &[Vec3]) -> f64 {
     let mut energy = Energy::default();
-    model.add_energy(0..model.count(), x, &mut energy);
+    model.law.add_energy(0..model.law.count(), x, &model.memory, &mut energy);
     energy.elastic()
 }
 
@@ -77,10 +91,11 @@ pub(crate) fn linearised(
     v: &[Vec3],
     linear: &Linear,
 ) -> (Vec<Vec3>, DMatrix<f64>) {
-    let models = std::slice::from_ref(model);
+    let models = std::slice::from_ref(&model.law);
+    let mut memory = vec![model.memory.clone()];
     let (mut assembler, pattern) = Assembler::new(x.len(), models, linear.psd);
     let mut corners = Corners::new(models);
-    assembler.elements.linearise(models, &mut corners, x, v, linear);
+    assembler.elements.linearise(models, &mut memory, &mut corners, x, v, linear);
     let mut matrix = BlockMatrix::new(std::sync::Arc::new(pattern));
     assembler.gather(&mut matrix, &|_| 0.0);
     (scatter(model, &corners.forces, x.len()), dense(&matrix))
@@ -116,7 +131,7 @@ fn matrix_error(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     (a - b).amax() / b.amax().max(1e-300)
 }
 
-const ELASTIC: Linear = Linear { damping: 0.0, stiffness: 1.0, ahead: 0.0, psd: Psd::Raw };
+const ELASTIC: Linear = Linear { damping: 0.0, stiffness: 1.0, ahead: 0.0, accept: false, psd: Psd::Raw };
 
 /// −dE/dx by central differences.
 fn force_by_differences(model: &Model, x: &[Vec3]) -> DVector<f64> {
@@ -188,7 +203,8 @@ pub(crate) fn check_blocks(model: &Model, x: &[Vec3], what: &str) {
 /// K_v against differences in the velocity, and corner forces f + τ K_x v against the blocks.
 pub(crate) fn check_velocity_terms(model: &Model, x: &[Vec3], v: &[Vec3], what: &str) {
     for psd in [Psd::Raw, Psd::Projected] {
-        let (_, d) = linearised(model, x, v, &Linear { damping: 1.0, stiffness: 0.0, ahead: 0.0, psd });
+        let (_, d) =
+            linearised(model, x, v, &Linear { damping: 1.0, stiffness: 0.0, ahead: 0.0, accept: false, psd });
         let expected = blocks_by_differences(model, x, v, true);
         let scale = expected.amax();
         assert!(scale > 0.0, "{what}: the model must be damped here");

@@ -2,13 +2,15 @@
 
 use std::{sync::Arc, time::Instant};
 
+use nalgebra::Matrix3;
+
 use super::{IntegratorParams, Prescribed};
 use crate::{
-    ClothSystem, Psd,
+    ClothSystem, Psd, StepError,
     assembly::{Assembler, BlockMatrix, Corners},
     forces::Linear,
     mesh::Vec3,
-    solver::{SolveError, SolveInfo, Solver},
+    solver::{SolveInfo, Solver},
 };
 
 /// Work space of the implicit schemes.
@@ -78,7 +80,7 @@ impl Workspace {
     /// A = M − dt K_v − dt² K_x at (x, v), and the corner forces f + `ahead` K_x v.
     pub(super) fn linearise(
         &mut self,
-        system: &ClothSystem,
+        system: &mut ClothSystem,
         psd: Psd,
         x: &[Vec3],
         v: &[Vec3],
@@ -86,8 +88,9 @@ impl Workspace {
         ahead: f64,
     ) {
         let start = Instant::now();
-        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, psd };
-        self.assembler.elements.linearise(system.models(), &mut self.corners, x, v, &linear);
+        let (models, memory, accept) = system.models_to_settle();
+        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, accept, psd };
+        self.assembler.elements.linearise(models, memory, &mut self.corners, x, v, &linear);
         let middle = Instant::now();
         let masses = system.masses();
         let scale = 1.0 + dt * system.air_damping();
@@ -114,10 +117,48 @@ impl Workspace {
         &mut self,
         params: &IntegratorParams,
         pins: &Prescribed<'_>,
-    ) -> Result<SolveInfo, SolveError> {
+    ) -> Result<SolveInfo, StepError> {
         let start = Instant::now();
         let info = self.solver.solve(&self.matrix, &self.b, pins.pinned, &mut self.dv, &params.solver);
         self.clock.solve += start.elapsed().as_secs_f64();
-        info
+        info.map_err(|error| StepError::Solver { error, vertices: self.suspects(pins.pinned) })
+    }
+
+    /// The free vertices at which a solve that failed went wrong, see [`StepError::Solver`].
+    fn suspects(&self, pinned: &[bool]) -> Vec<u32> {
+        /// At most this many vertices are named.
+        const NAMED: usize = 64;
+        /// Where none stands out, this many.
+        const LEAST_BOUND: usize = 8;
+        let free = || (0..self.b.len()).filter(|&i| !pinned[i]);
+        let name = |list: &mut dyn Iterator<Item = usize>| -> Vec<u32> {
+            list.take(NAMED).map(|i| i as u32).collect()
+        };
+        let finite = |i: &usize| {
+            self.b[*i].iter().all(|c| c.is_finite()) && self.matrix.diagonal[*i].iter().all(|c| c.is_finite())
+        };
+        let bad = name(&mut free().filter(|i| !finite(i)));
+        if !bad.is_empty() {
+            return bad;
+        }
+        let definite = |i: &usize| Matrix3::from_column_slice(&self.matrix.diagonal[*i]).cholesky().is_some();
+        let bad = name(&mut free().filter(|i| !definite(i)));
+        if !bad.is_empty() {
+            return bad;
+        }
+        // Gershgorin: the least eigenvalue of a vertex's block against the size of its couplings.
+        let pattern = &self.matrix.pattern;
+        let size = |k: usize| self.matrix.upper[9 * k..9 * k + 9].iter().map(|c| c * c).sum::<f64>().sqrt();
+        let surplus = |i: usize| {
+            let least = Matrix3::from_column_slice(&self.matrix.diagonal[i]).symmetric_eigenvalues().min();
+            let upper: f64 = pattern.upper_of(i).map(size).sum();
+            let lower: f64 = pattern.lower_of(i).iter().map(|&[_, k]| size(k as usize)).sum();
+            least / (upper + lower).max(f64::MIN_POSITIVE)
+        };
+        let mut order: Vec<(f64, usize)> = free().map(|i| (surplus(i), i)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut weakest: Vec<u32> = order.iter().take(LEAST_BOUND).map(|o| o.1 as u32).collect();
+        weakest.sort_unstable();
+        weakest
     }
 }

@@ -7,7 +7,7 @@ use crate::{ClothSystem, StepError, mesh::Vec3};
 
 pub(super) fn step(
     work: &mut Workspace,
-    system: &ClothSystem,
+    system: &mut ClothSystem,
     params: &IntegratorParams,
     x: &mut [Vec3],
     v: &mut [Vec3],

@@ -223,6 +223,10 @@ impl Integrator {
         }
         let (x, v) = (&mut x[..n], &mut v[..n]);
         let Self { system, params, pool, pinned, work } = self;
+        if params.method != Method::ImplicitEuler {
+            // That one moves memory on as it linearises at x, in one pass.
+            pool.install(|| system.settle(x));
+        }
         let result = pool.install(|| match work {
             Work::Explicit(buffers) => {
                 Ok(buffers.step(system, params.method, x, v, dt, &Prescribed { pins, pinned }))
@@ -246,13 +250,10 @@ impl Integrator {
         result
     }
 
-    /// Takes the motion to `x` [m] as done: laws with memory move on. Once per accepted step; without it a step, a retry
-    /// or a response leaves no trace.
-    pub fn accept(&mut self, x: &[Vec3]) {
-        if self.system.remembers() {
-            let Self { system, pool, .. } = self;
-            pool.install(|| system.accept(x));
-        }
+    /// Takes the motion to the positions at which the next step starts as done: laws with memory move on. Once per
+    /// accepted step; without it a step, a retry or a response leaves no trace.
+    pub fn accept(&mut self) {
+        self.system.accept();
     }
 
     /// Puts back what [`ClothSystem::memory`] gave.

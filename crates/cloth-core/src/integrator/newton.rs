@@ -20,7 +20,7 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 pub(super) fn step(
     work: &mut Workspace,
-    system: &ClothSystem,
+    system: &mut ClothSystem,
     params: &IntegratorParams,
     x: &mut [Vec3],
     v: &mut [Vec3],
@@ -46,7 +46,7 @@ pub(super) fn step(
 
 fn iterate(
     work: &mut Workspace,
-    system: &ClothSystem,
+    system: &mut ClothSystem,
     params: &IntegratorParams,
     x: &[Vec3],
     v: &[Vec3],
@@ -136,7 +136,7 @@ fn evaluate(
     dt: f64,
     pins: &Prescribed<'_>,
 ) -> Merit {
-    work.corners.evaluate(system.models(), x1, v1);
+    work.corners.evaluate(system.models(), system.settled_memory(), x1, v1);
     system.gather(&mut work.corners, v1, -dt, &mut work.residual);
     let mut potential = system.potential(x1, v1, dt, &mut work.corners.clock);
     let mut squares = 0.0;

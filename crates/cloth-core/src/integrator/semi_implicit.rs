@@ -46,7 +46,7 @@ impl SubSteps {
     pub(super) fn step(
         &mut self,
         work: &mut Workspace,
-        system: &ClothSystem,
+        system: &mut ClothSystem,
         params: &IntegratorParams,
         x: &mut [Vec3],
         v: &mut [Vec3],

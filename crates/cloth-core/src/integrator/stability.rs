@@ -31,9 +31,10 @@ pub(super) fn stable_step(system: &ClothSystem, method: Method, x: &[Vec3], v: &
     let (mut assembler, pattern) = Assembler::new(system.vertex_count(), system.models(), Psd::Projected);
     let pattern = std::sync::Arc::new(pattern);
     let mut corners = Corners::new(system.models());
+    let mut memory = system.settled_memory().to_vec();
     let mut build = |damping: f64, stiffness: f64| {
-        let linear = Linear { damping, stiffness, ahead: 0.0, psd: Psd::Projected };
-        assembler.elements.linearise(system.models(), &mut corners, x, v, &linear);
+        let linear = Linear { damping, stiffness, ahead: 0.0, accept: false, psd: Psd::Projected };
+        assembler.elements.linearise(system.models(), &mut memory, &mut corners, x, v, &linear);
         let mut matrix = BlockMatrix::new(pattern.clone());
         let rate = damping * system.air_damping();
         assembler.gather(&mut matrix, &|row| rate * system.masses()[row]);
