@@ -104,6 +104,12 @@ pub enum StepError {
         entry: usize,
     },
     /// The linear solver broke down.
-    #[error(transparent)]
-    Solver(#[from] SolveError),
+    #[error("{error}")]
+    Solver {
+        /// Why.
+        error: SolveError,
+        /// Where: the cloth vertices whose forces or couplings are not finite, else those whose own block of the matrix
+        /// is not positive definite, else the few that outweigh their neighbours least; ascending.
+        vertices: Vec<u32>,
+    },
 }

@@ -5,7 +5,8 @@
 mod support;
 
 use cloth_core::{
-    Bending, Environment, Integrator, Material, Method, Pins, Psd, SolverParams, StepError, mesh::Vec3,
+    Bending, Environment, InPlane, Integrator, IntegratorParams, Material, Method, Pins, Psd, SolverMethod,
+    SolverParams, StepError, mesh::Vec3,
 };
 use support::{FREE, SOFT, SPRINGS, distance, integrator, params, sheet, system, undamped, wavy};
 
@@ -355,7 +356,40 @@ fn bad_steps_are_refused_and_change_nothing() {
     ));
     assert_eq!((&x, &v), (&x0, &v0));
     x[2].y = f64::NAN;
-    assert!(matches!(integrator.step(&mut x, &mut v, 0.0, 0.01, &FREE), Err(StepError::Solver(_))));
+    match integrator.step(&mut x, &mut v, 0.0, 0.01, &FREE) {
+        Err(StepError::Solver { vertices, .. }) => {
+            // Vertex 2 and those that share an element with it.
+            assert!(vertices.contains(&2) && vertices.len() < 16, "{vertices:?}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// An indefinite matrix is said with the vertices where it is: a sheet pressed together at one place, exact Hessians.
+#[test]
+fn a_solver_that_fails_names_vertices() {
+    let mesh = sheet(1.0, 9);
+    let stiff = Material { in_plane: InPlane::Spring { stiffness: 1e5, damping: 0.0 }, ..SPRINGS };
+    for method in [SolverMethod::Pcg, SolverMethod::PcgJacobi, SolverMethod::FaerCg, SolverMethod::FaerLlt] {
+        let solver = SolverParams { method, ..SolverParams::default() };
+        let raw = IntegratorParams { psd: Psd::Raw, solver, ..params(Method::ImplicitEuler) };
+        let mut integrator = integrator(system(&mesh, &stiff, &Environment::default()), raw);
+        let (mut x, mut v) = (mesh.vertices.clone(), vec![Vec3::zeros(); 81]);
+        // The middle's neighbourhood to a tenth: springs under that pressure push across.
+        for i in [30, 31, 32, 39, 40, 41, 48, 49, 50] {
+            x[i] = x[40] + (x[i] - x[40]) * 0.1;
+        }
+        let before = x.clone();
+        match integrator.step(&mut x, &mut v, 0.0, 0.01, &FREE) {
+            Err(StepError::Solver { vertices, error }) => {
+                assert!(!vertices.is_empty() && vertices.len() < 40, "{method:?}: {vertices:?} {error}");
+                assert!(vertices.is_sorted(), "{vertices:?}");
+                assert!(vertices.contains(&40), "{method:?}: {vertices:?} {error}");
+            }
+            other => panic!("{method:?}: {other:?}"),
+        }
+        assert_eq!(x, before);
+    }
 }
 
 /// Sums of clock readings in two orders.

@@ -54,6 +54,15 @@ pub(crate) struct ColliderBody {
     pub(crate) motion: Motion,
 }
 
+impl ClothBody {
+    /// Half of the cloth's sides are at most so long at rest [m].
+    pub(crate) fn median_edge(&self) -> f64 {
+        let mut lengths: Vec<f64> = self.rest.side_lengths.iter().flatten().copied().collect();
+        let middle = lengths.len() / 2;
+        *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+}
+
 /// All bodies of a scene, cloth first.
 pub(crate) struct Bodies {
     pub(crate) cloth: Vec<ClothBody>,
@@ -73,6 +82,7 @@ impl Bodies {
             cloth.push(body);
         }
         let cloth_vertices = next;
+        check_thickness(scene, &cloth)?;
         let mut colliders = Vec::with_capacity(scene.collider.len());
         for (i, source) in scene.collider.iter().enumerate() {
             let body = collider_body(scene, assets, source, &format!("collider[{i}]"), next)?;
@@ -101,6 +111,20 @@ impl Bodies {
     }
 }
 
+/// Refuses a thickness that is no less than the size of a piece of cloth.
+fn check_thickness(scene: &Scene, cloth: &[ClothBody]) -> Result<(), SceneError> {
+    let Some(contact) = &scene.contact else { return Ok(()) };
+    for (body, source) in cloth.iter().zip(&scene.cloth) {
+        let (lo, hi) = body.mesh.bounds().unwrap_or_default();
+        let size = (hi - lo).norm();
+        if contact.thickness >= size {
+            let expected = format!("less than the size of \"{}\", {size:.3e} m", source.name);
+            return Err(scene.error("contact.thickness", expected, format!("{}", contact.thickness)));
+        }
+    }
+    Ok(())
+}
+
 fn cloth_body(
     scene: &Scene,
     assets: &Assets,
@@ -111,8 +135,8 @@ fn cloth_body(
     let mesh_key = format!("{key}.mesh");
     let mesh = load(scene, assets, &source.mesh, &mesh_key)?;
     let defect = |error: MeshError| mesh_error(scene, &mesh_key, &source.name, &error);
-    mesh.check().map_err(defect)?;
     scene.check_points(&mesh_key, &mesh.vertices, LENGTH, "m", vertex_of(&source.name))?;
+    mesh.check().map_err(defect)?;
     let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
     let material = scene.resolve_material(source, key)?;
     if !matches!(material.bending, cloth_core::Bending::None) {
@@ -237,8 +261,8 @@ fn collider_body(
             return Err(scene.error(key, "exactly one of shape, mesh, sequence", "none"));
         };
         let mesh = load(scene, assets, mesh, &mesh_key)?;
-        mesh.check().map_err(|error| mesh_error(scene, &mesh_key, &source.name, &error))?;
         scene.check_points(&mesh_key, &mesh.vertices, LENGTH, "m", vertex_of(&source.name))?;
+        mesh.check().map_err(|error| mesh_error(scene, &mesh_key, &source.name, &error))?;
         mesh
     };
     let motion = Motion::rigid(&mesh.vertices, source);

@@ -196,6 +196,18 @@ pub(crate) fn build(
     if contact.is_none() && !scene.collider.is_empty() {
         warnings.push("there are colliders but no [contact]: cloth passes through them".into());
     }
+    if let Some(contact) = &scene.contact {
+        warnings.extend(bodies.cloth.iter().zip(&scene.cloth).filter_map(|(body, source)| {
+            let edge = body.median_edge();
+            (contact.thickness > edge).then(|| {
+                format!(
+                    "contact.thickness = {} m is above the edge length of \"{}\", about {edge:.3e} m: every vertex is near \
+                     many others, which takes time, and cloth keeps more distance than its mesh can show",
+                    contact.thickness, source.name
+                )
+            })
+        }));
+    }
     let triangles = bodies.cloth.iter().map(|c| c.mesh.triangles.len()).sum::<usize>()
         + bodies.colliders.iter().map(|c| c.triangles.len()).sum::<usize>();
     effects.on.append(&mut effects.off);

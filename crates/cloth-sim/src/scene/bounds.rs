@@ -94,20 +94,25 @@ impl Scene {
         let size = numbers.iter().filter_map(Value::as_f64).map(f64::abs).fold(0.0, f64::max);
         let is_of =
             |end: &&str| path.strip_suffix(*end).is_some_and(|rest| rest.is_empty() || rest.ends_with('.'));
-        let bound = BOUNDS.iter().find(|b| b.keys.iter().any(|end| is_of(&end))).unwrap_or(&OTHER);
+        let bound = BOUNDS.iter().find(|b| b.keys.iter().any(is_of)).unwrap_or(&OTHER);
         if size == 0.0 || (bound.least..=bound.largest).contains(&size) {
             return Ok(());
         }
         let (word, limit) = if size < bound.least { ("least", bound.least) } else { ("most", bound.largest) };
         let expected = format!("at {word} {limit:e}{} in size ({})", bound.unit, bound.why);
+        let text = |n: &Value| match n.as_f64() {
+            Some(x) if n.is_f64() => format!("{x:?}"),
+            _ => n.to_string(),
+        };
         let got = match numbers {
-            [one] => one.to_string(),
-            many => format!("[{}]", many.iter().map(Value::to_string).collect::<Vec<_>>().join(", ")),
+            [one] => text(one),
+            many => format!("[{}]", many.iter().map(text).collect::<Vec<_>>().join(", ")),
         };
         Err(self.error(key, expected, got))
     }
 
-    /// Refuses points or velocities of an asset that lie beyond `largest` (`unit`); `item` names one by its index.
+    /// Refuses points or velocities of an asset that lie beyond `largest` (`unit`); `item` names one by its index. What
+    /// is not finite is not looked at.
     pub(crate) fn check_points(
         &self,
         key: &str,
@@ -116,7 +121,7 @@ impl Scene {
         unit: &str,
         item: impl Fn(usize) -> String,
     ) -> Result<(), SceneError> {
-        match points.iter().position(|p| p.amax() > largest) {
+        match points.iter().position(|p| p.amax() > largest && p.iter().all(|c| c.is_finite())) {
             Some(i) => {
                 let p = points[i];
                 let got = format!("[{:?}, {:?}, {:?}] at {}", p.x, p.y, p.z, item(i));

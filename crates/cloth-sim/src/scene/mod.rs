@@ -21,9 +21,9 @@ pub use output::Output;
 pub use source::SceneError;
 pub use world::{Air, Contact, Time, Up};
 
+pub(crate) use bounds::{LENGTH, VELOCITY};
 use cloth_core::SolverParams;
 use serde::{Deserialize, Serialize};
-pub(crate) use bounds::{LENGTH, VELOCITY};
 use source::Source;
 use std::sync::Arc;
 
