@@ -332,8 +332,11 @@ mod tests {
         p
     }
 
-    /// Rows of all pairs in one unit box, eight at a time, beside their positions.
-    fn groups(count: usize) -> Vec<([[Vec3; 6]; 8], [[Row; 6]; 8])> {
+    /// Eight pairs: positions and rows.
+    type Group = ([[Vec3; 6]; 8], [[Row; 6]; 8]);
+
+    /// Pairs in one unit box.
+    fn groups(count: usize) -> Vec<Group> {
         let mut random = Random(3);
         let mut x: Vec<Vec3> = (0..8 * count).flat_map(|_| pair(&mut random)).collect();
         // The box's corners, so that the units are metres.
@@ -352,7 +355,7 @@ mod tests {
     fn verdicts_agree_with_the_exact_predicates() {
         let (mut apart_count, mut meet_count, mut open_count) = (0, 0, 0);
         for (positions, rows) in groups(40_000) {
-            let rows = rows.each_ref().map(|rows| rows.each_ref());
+            let rows = rows.each_ref().map(<[Row; 6]>::each_ref);
             let joined = rows.map(|[common, a, b, _, p, q]| [common, a, b, p, q]);
             let apart = [eight_triangles_maybe_apart(&rows), eight_triangles_apart(&rows)];
             let [decided_apart, decided_meet] = eight_triangles_decided(&rows);
@@ -379,7 +382,7 @@ mod tests {
     #[test]
     fn one_lane_answers_as_eight() {
         for (_, rows) in groups(500) {
-            let references = rows.each_ref().map(|rows| rows.each_ref());
+            let references = rows.each_ref().map(<[Row; 6]>::each_ref);
             let decided = eight_triangles_decided(&references);
             let (maybe, apart) =
                 (eight_triangles_maybe_apart(&references), eight_triangles_apart(&references));
