@@ -41,6 +41,14 @@ pub enum CoreError {
         /// Names in the library.
         known: Vec<&'static str>,
     },
+    /// The library has no bending law of this name.
+    #[error("bending: expected one of {known:?}, got \"{got}\"")]
+    UnknownLaw {
+        /// The name that came.
+        got: String,
+        /// Names of the laws.
+        known: Vec<&'static str>,
+    },
     /// An element has no extent in its rest shape, so its law is not defined.
     #[error(
         "{model}: expected elements with an extent, element {element} (vertices {vertices:?}) has {measure} {got:e}"

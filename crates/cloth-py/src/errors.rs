@@ -104,6 +104,9 @@ pub(crate) fn core_error(py: Python<'_>, error: &CoreError) -> PyErr {
         CoreError::UnknownMaterial { got, known } => {
             invalid_input(py, "material", &format!("one of {known:?}"), &format!("\"{got}\""))
         }
+        CoreError::UnknownLaw { got, known } => {
+            invalid_input(py, "bending", &format!("one of {known:?}"), &format!("\"{got}\""))
+        }
         CoreError::Length { name, expected, got } => {
             invalid_input(py, name, &format!("length {expected}"), &got.to_string())
         }

@@ -40,6 +40,9 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scene::scene_schema, module)?)?;
     module.add_function(wrap_pyfunction!(scene::material_names, module)?)?;
     module.add_function(wrap_pyfunction!(scene::material_named, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::bending_laws, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::fabric, module)?)?;
+    module.add_function(wrap_pyfunction!(scene::fabric_sources, module)?)?;
     module.add_function(wrap_pyfunction!(scene::check_material, module)?)?;
 
     module.add_class::<simulation::PySimulation>()?;

@@ -62,11 +62,42 @@ pub(crate) fn material_names() -> Vec<&'static str> {
     library::names()
 }
 
-/// A material of the library, as JSON.
+/// A fabric of the library under a bending law, as JSON.
 #[pyfunction]
-pub(crate) fn material_named(py: Python<'_>, name: &str) -> PyResult<String> {
-    let material = library::named(name).map_err(|error| core_error(py, &error))?;
+pub(crate) fn material_named(py: Python<'_>, name: &str, bending: &str) -> PyResult<String> {
+    let material = library::named_with(name, bending).map_err(|error| core_error(py, &error))?;
     to_json(py, &material)
+}
+
+/// Names of the bending laws that the library knows.
+#[pyfunction]
+pub(crate) fn bending_laws() -> Vec<&'static str> {
+    library::LAWS.to_vec()
+}
+
+/// Everything that the library has on a fabric, as JSON; `key` is empty where a value is an estimate, and `note` says
+/// where in the reference it is or what it rests on.
+#[pyfunction]
+pub(crate) fn fabric(py: Python<'_>, name: &str) -> PyResult<String> {
+    let fabric = library::fabric(name).map_err(|error| core_error(py, &error))?;
+    let row = |property: library::Property| {
+        let (key, note) = match property.quantity.source {
+            library::Source::Published { key, at } => (key, at),
+            library::Source::Estimate(basis) => ("", basis),
+        };
+        let value = serde_json::json!({
+            "value": property.quantity.value, "unit": property.unit, "key": key, "note": note,
+        });
+        (property.name.to_owned(), value)
+    };
+    let values: serde_json::Map<_, _> = fabric.properties().into_iter().map(row).collect();
+    Ok(serde_json::json!({ "name": fabric.name, "about": fabric.about, "values": values }).to_string())
+}
+
+/// References of the library's published values: key, and what it is.
+#[pyfunction]
+pub(crate) fn fabric_sources() -> Vec<(&'static str, &'static str)> {
+    library::SOURCES.iter().map(|source| (source.key, source.about)).collect()
 }
 
 /// Refuse what is no material; the result has the defaults written out.
