@@ -42,7 +42,7 @@ class Setup:
     air_damping: float = 20.0  # 1/s
     friction: float = 0.5
     thickness: float = 2e-3
-    open: float = 0.055  # distance of the planes when lifted
+    open: float = 0.05  # distance of the planes when lifted
     closed: float = 0.019  # … when clamped
     fold_time: float = 0.4
     lower_time: float = 0.12
@@ -92,8 +92,8 @@ class Specimen:
     body: Body
 
     def apex(self) -> int:
-        """The hinge that is bent most in the clamps."""
-        return int(np.argmax(np.abs(self.clamped["curvature"]).mean(axis=0)))
+        """The hinge on the fold: the one that no clamping leaves less bent than the others."""
+        return int(np.argmax(np.abs(self.clamped["curvature"]).min(axis=0)))
 
     def fold_angle(self, setup: Setup) -> float:
         """Angle between the two legs of the hung strip, flat = 0 [rad]."""
