@@ -118,6 +118,8 @@ class Simulation:
         A value or a mesh cannot be used; file, line and key are named.
     IntersectingStart
         Triangles pass through each other at the start; how many and which are named.
+    TypeError
+        ``scene`` is no `Scene`.
 
     Examples
     --------
@@ -138,6 +140,8 @@ class Simulation:
         *,
         allow_intersections: bool = False,
     ) -> None:
+        if not isinstance(scene, Scene):
+            raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
         check_device(device)
         self._core = _core.Simulation(scene.check(), *scene.assets(), check_threads(threads), bool(allow_intersections))
 

@@ -203,6 +203,15 @@ def test_everything_that_output_asks_for(tmp_path: Path, run_cli: RunCli) -> Non
     assert visible(out) == ["frames.npz", "report.json"]
 
 
+def test_warnings_of_the_plan_come_before_the_run(tmp_path: Path, run_cli: RunCli) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE.replace("thickness = 0.006", "thickness = 0.1").replace("0.42", "0.6"))
+    done = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--frames", "1")
+    assert done.returncode == 0, done.stderr
+    assert "warning: contact.thickness = 0.1 m is above the edge length" in done.stderr
+    quiet = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--frames", "1", "--overwrite", "--quiet")
+    assert quiet.stderr == ""
+
+
 def test_an_output_folder_that_holds_a_run_is_not_touched(tmp_path: Path, scene_file: Path, run_cli: RunCli) -> None:
     out = tmp_path / "out"
     out.mkdir()
@@ -324,6 +333,7 @@ def test_every_command_has_help_with_an_example_and_json(run_cli: RunCli, comman
         (["rnu"], 2, "invalid choice: 'rnu' (choose from"),
         ([], 2, "required: COMMAND"),
         (["run", "SCENE"], 2, "required: -o/--out"),
+        (["run", "SCENE", "-o", ""], 2, "-o/--out: expected a folder, got ''"),
         (["run", "SCENE", "-o", "OUT", "--thread", "2"], 2, "unrecognized arguments: --thread 2"),
         (["run", "SCENE", "-o", "OUT", "--threads", "0"], 2, "--threads: expected a whole number ≥ 1, got '0'"),
         (["run", "SCENE", "-o", "OUT", "--frames", "few"], 2, "--frames: expected a whole number ≥ 1, got 'few'"),

@@ -227,6 +227,10 @@ def test_ctrl_c_stops_between_two_steps(tmp_path: Path) -> None:
 def test_bad_arguments(call: Any, message: str) -> None:
     with pytest.raises(cs.InvalidInput, match=message):
         call(cs.Simulation(drop(5)))
+    no_scenes: list[Any] = [None, {}, "scene.toml"]
+    for wrong in no_scenes:
+        with pytest.raises(TypeError, match=r"scene: expected a clothsim\.Scene, got (NoneType|dict|str)"):
+            cs.Simulation(wrong)
     with pytest.raises(cs.GpuUnavailable):
         cs.Simulation(drop(5), device="gpu")
 
@@ -242,6 +246,20 @@ def test_what_diverges_stops_with_the_last_good_state() -> None:
     assert caught.value.time == sim.time
     assert len(caught.value.vertices) > 0
     assert np.isfinite(sim.positions).all()
+
+
+def test_a_solver_that_breaks_down_names_vertices() -> None:
+    """Exact Hessians of a sheet pressed together are indefinite at any step that is tried."""
+    stiff = {"areal_density": 0.1, "in_plane": {"model": "spring", "stiffness": 1e9}}
+    scene = cs.Scene(duration=1.0, time={"dt": 0.05, "indefinite": "raw", "max_halvings": 1})
+    mesh = cs.Mesh.grid(1.0, 1.0, 7, 7)
+    squeezed = mesh.vertices * [0.1, 1.0, 0.1]
+    scene.add_cloth(cs.Mesh(squeezed, mesh.triangles, mesh.uv), stiff, rest="uv")
+    sim = cs.Simulation(scene)
+    with pytest.raises(cs.SimulationDiverged, match=r"linear solver: .*; vertices \d") as caught:
+        sim.step()
+    assert 0 < len(caught.value.vertices) <= 49
+    assert all(0 <= vertex < 49 for vertex in caught.value.vertices)
 
 
 def test_a_disk_that_is_full_leaves_the_old_checkpoint(tmp_path: Path) -> None:

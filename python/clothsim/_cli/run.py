@@ -22,7 +22,7 @@ EXAMPLE = "clothsim run examples/drape.toml -o out/drape --threads 2"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Scene, output folder, and how to run."""
     parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    parser.add_argument("-o", "--out", metavar="OUT", required=True, type=Path, help="output folder")
+    parser.add_argument("-o", "--out", metavar="OUT", required=True, type=_folder, help="output folder")
     parser.add_argument(
         "--threads", metavar="N", type=_count, help="how many threads (default: all); results do not depend on it"
     )
@@ -37,6 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     mode.add_argument("--resume", action="store_true", help="go on with an unfinished run in OUT, or start one")
     mode.add_argument("--overwrite", action="store_true", help="replace a run that OUT holds")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def _folder(text: str) -> Path:
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f"expected a folder, got {text!r}")
+    return Path(text)
 
 
 def _count(text: str) -> int:

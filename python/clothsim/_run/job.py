@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -141,6 +142,9 @@ class Job:
         if not self.resume:
             folder.clear_work()
         header, simulation = self._start(folder, fingerprint, simulation)
+        if self.progress and header["frames"] == 0:
+            for warning in simulation.plan["warnings"]:
+                print(f"warning: {warning}", file=sys.stderr)
         fps = float(settings["fps"])
         lengths = frame_lengths(self.scene.duration, fps)[: self.frames]
         bodies = simulation.bodies
