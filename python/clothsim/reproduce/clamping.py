@@ -80,6 +80,8 @@ class Specimen:
         Where they are along the strip [m].
     hung : (n, 3) float64 or None
         Positions after hanging [m].
+    rest : (hinges,) float64
+        Rest curvature at the end [1/m].
     """
 
     model: str
@@ -89,6 +91,7 @@ class Specimen:
     path: Floats
     place: Floats
     hung: Floats | None
+    rest: Floats
     body: Body
 
     def apex(self) -> int:
@@ -144,7 +147,10 @@ def clamp(model: str, cycles: int, setup: Setup, *, hang: bool, tick: Any = None
     if hang:
         simulation.advance(setup.hang_time)
         hung = simulation.positions
-    return Specimen(model, cycles, _stack(clamped), _stack(lifted), np.array(path), place, hung, simulation.bodies[0])
+    return Specimen(
+        model, cycles, _stack(clamped), _stack(lifted), np.array(path), place, hung, simulation.hinges.rest_curvature[ids],
+        simulation.bodies[0],
+    )  # fmt: skip
 
 
 def _state(simulation: Simulation, ids: Ints) -> dict[str, Floats]:

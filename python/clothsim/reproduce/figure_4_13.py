@@ -40,7 +40,7 @@ class Measured:
 
     def rest(self, law: str) -> list[float]:
         """Angle by which the fold's rest shape is turned: sum of rest curvature times h̄ across the fold [rad]."""
-        return [self.rest_angle(specimen.lifted["rest_curvature"][-1]) for specimen in self.specimens[law]]
+        return [self.rest_angle(specimen.rest) for specimen in self.specimens[law]]
 
     def rest_angle(self, curvature: Floats) -> float:
         """∫ K ds along the strip."""
@@ -75,7 +75,7 @@ def tables(measured: Measured) -> Mapping[str, Table]:
     """One row per strip, and their middle lines as they hang."""
     columns = ("law", "n", "fold angle hung [rad]", "fold angle at rest [rad]", "largest rest curvature [1/m]")
     rows = [
-        (law, s.cycles, angle, rest, float(np.abs(s.lifted["rest_curvature"][-1]).max()))
+        (law, s.cycles, angle, rest, float(np.abs(s.rest).max()))
         for law in LAWS
         for s, angle, rest in zip(measured.specimens[law], measured.angles(law), measured.rest(law), strict=True)
     ]
@@ -153,7 +153,7 @@ def _render(measured: Measured) -> dict[str, list[Any]]:
     setup = measured.setup
     copies = 11
     width = 0.05
-    turn = math.radians(25.0)
+    turn = math.radians(125.0)  # the hollow of the fold faces the light
     rotation = np.array([[math.cos(turn), 0, -math.sin(turn)], [0, 1, 0], [math.sin(turn), 0, math.cos(turn)]])
     states = []
     for law in LAWS:
