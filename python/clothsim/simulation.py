@@ -295,7 +295,10 @@ class Simulation:
 
     @property
     def report(self) -> dict[str, Any]:
-        """What happened so far: ``steps`` (one table each), ``totals``, ``effects`` with their cost, ``threads``."""
+        """What happened so far: ``steps`` (one table each), ``totals``, ``effects`` with their cost, ``threads``.
+
+        ``left_out`` counts the first steps that a checkpoint had no tables of; ``totals`` and ``effects`` have them.
+        """
         report: dict[str, Any] = json.loads(self._core.summary())
         report["steps"] = json.loads(self._core.steps(0))
         return report
@@ -305,9 +308,18 @@ class Simulation:
 
     # Checkpoints -----------------------------------------------------------------------------------------------
 
-    def save_checkpoint(self, path: str | os.PathLike[str]) -> None:
-        """Write scene, meshes and the full state to a file, whole or not at all."""
-        write_whole(Path(path), self._core.checkpoint())
+    def save_checkpoint(self, path: str | os.PathLike[str], *, steps: bool = True) -> None:
+        """Write scene, meshes, the full state and the report to a file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        steps : bool
+            Write the table of each step too. They grow with the run; without them, a simulation that goes on from here
+            has the totals of all steps and the tables of the later ones.
+        """
+        write_whole(Path(path), self._core.checkpoint(0 if steps else self._step_reports()))
 
     @classmethod
     def resume(cls, path: str | os.PathLike[str], threads: int | None = None) -> Simulation:

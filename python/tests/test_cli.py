@@ -16,6 +16,7 @@ import pytest
 from conftest import ROOT, SCENE, RunCli, cli_command
 
 import clothsim as cs
+from clothsim._run.folder import RunFolder
 from clothsim._run.job import Job, Stopped
 
 
@@ -54,6 +55,15 @@ def test_equal_runs_give_equal_bytes(
     assert frames(tmp_path / "out") == frames(reference)
     assert visible(tmp_path / "out") == ["frames.npz", "report.json"], "no work folder is left"
     assert json.loads((tmp_path / "out" / "report.json").read_text())["threads"] == int(threads)
+
+
+def untimed(report: dict[str, Any]) -> dict[str, Any]:
+    """Return what does not depend on clocks, threads and the memory that contact happened to hold."""
+    frames = [{key: value for key, value in frame.items() if key != "seconds"} for frame in report["frames"]]
+    totals = {key: value for key, value in report["totals"].items() if "seconds" not in key}
+    effects = [(effect["name"], effect["elements"]) for effect in report["effects"]]
+    kept = ("scene", "scene_digest", "error", "simulated_seconds", "frame_count", "fps", "bodies", "outputs")
+    return {key: report[key] for key in kept} | {"frames": frames, "totals": totals, "effects": effects}
 
 
 def wait_for(condition: Any, process: subprocess.Popen[str]) -> None:
@@ -102,8 +112,27 @@ def test_a_killed_run_resumes_to_the_same_bytes(tmp_path: Path, run_cli: RunCli,
     assert done.returncode == 0, done.stderr
     assert frames(out) == frames(slow_reference / "out")
     assert visible(out) == ["frames.npz", "report.json"]
+    ours, whole = (untimed(json.loads((o / "report.json").read_text())) for o in (out, slow_reference / "out"))
+    assert ours == whole, "the report is complete"
+    assert ours["totals"]["steps"] == sum(frame["steps"] for frame in ours["frames"]) > 50
     again = run_cli("run", scene, "-o", out, "--resume", "--json")
     assert json.loads(again.stdout)["resumed"] == "complete already"
+
+
+def test_checkpoints_of_a_run_do_not_grow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE.replace("checkpoint_interval = 0.1", "checkpoint_interval = 0.0333"))
+    sizes: list[int] = []
+    save = RunFolder.save_checkpoint
+
+    def recorded(self: RunFolder, header: dict[str, Any], engine: bytes) -> None:
+        sizes.append(len(engine))
+        save(self, header, engine)
+
+    monkeypatch.setattr(RunFolder, "save_checkpoint", recorded)
+    Job(cs.Scene.load(tmp_path / "scene.toml"), tmp_path / "out", progress=False).run()
+    assert len(sizes) > 10
+    # A step's table has some 500 bytes; between two frames there are seven steps.
+    assert abs(sizes[-1] - sizes[3]) < 500, sizes
 
 
 @pytest.mark.parametrize(
@@ -124,6 +153,8 @@ def test_ctrl_c_saves_a_checkpoint_and_says_how_to_go_on(
     done = run_cli("run", scene, "-o", out, "--resume", "--quiet")
     assert done.returncode == 0, done.stderr
     assert frames(out) == frames(slow_reference / "out")
+    ours, whole = (untimed(json.loads((o / "report.json").read_text())) for o in (out, slow_reference / "out"))
+    assert ours == whole, "steps within the frame that was cut short are in the report"
 
 
 def test_a_signal_in_a_frames_last_step_loses_no_frame(

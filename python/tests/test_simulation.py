@@ -126,6 +126,33 @@ def test_a_checkpoint_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["half"]
 
 
+def test_a_checkpoint_without_steps_does_not_grow(tmp_path: Path) -> None:
+    sim = cs.Simulation(drop(5), threads=1)
+    sizes, full = [], []
+    for count in (10, 40):
+        for _ in range(count):
+            sim.step()
+        sim.save_checkpoint(tmp_path / "short", steps=False)
+        sim.save_checkpoint(tmp_path / "full")
+        sizes.append((tmp_path / "short").stat().st_size)
+        full.append((tmp_path / "full").stat().st_size)
+    assert full[1] > full[0] + 40 * 200, "each step has a table"
+    assert abs(sizes[1] - sizes[0]) < 400, "but for the digits of the totals"
+    resumed = cs.Simulation.resume(tmp_path / "short")
+    assert resumed.report["left_out"] == 50
+    assert resumed.report["steps"] == []
+    assert resumed.report["totals"] == sim.report["totals"]
+    assert resumed.report["effects"] == sim.report["effects"]
+    report = resumed.step()
+    assert report["step"] == 51
+    assert [step["step"] for step in resumed.report["steps"]] == [51]
+    sim.step()
+    np.testing.assert_array_equal(sim.positions, resumed.positions)
+    assert resumed.report["totals"]["linear_iterations"] == sim.report["totals"]["linear_iterations"]
+    resumed.save_checkpoint(tmp_path / "again")
+    assert cs.Simulation.resume(tmp_path / "again").report["left_out"] == 50
+
+
 @pytest.mark.parametrize(
     "damage",
     [lambda b: b[:-1], lambda b: b[:100], lambda b: b"", lambda b: b"PK" + b[2:], lambda b: b[:500] + b"!" + b[501:]],

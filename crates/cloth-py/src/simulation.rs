@@ -156,21 +156,21 @@ impl PySimulation {
         Ok((json(py, &plan)?, plan.to_string()))
     }
 
-    /// Totals, effects and threads of the report, without its steps, as JSON.
+    /// Totals, effects, threads and steps left out of the report, without its steps, as JSON.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
-        let (totals, effects, threads) = self.read(py, |simulation| {
+        let (totals, effects, threads, left_out) = self.read(py, |simulation| {
             let report = simulation.report();
-            (report.totals.clone(), report.effects.clone(), report.threads)
+            (report.totals.clone(), report.effects.clone(), report.threads, report.left_out)
         });
-        json(py, &serde_json::json!({ "totals": totals, "effects": effects, "threads": threads }))
+        let summary = serde_json::json!({
+            "totals": totals, "effects": effects, "threads": threads, "left_out": left_out
+        });
+        json(py, &summary)
     }
 
-    /// The reports of the steps from number `first` (from 0) on, as JSON.
+    /// The reports of the steps from number `first` (from 0, those left out counted) on, as JSON.
     fn steps(&self, py: Python<'_>, first: usize) -> PyResult<String> {
-        let steps = self.read(py, |simulation| {
-            let steps = &simulation.report().steps;
-            steps[first.min(steps.len())..].to_vec()
-        });
+        let steps = self.read(py, |simulation| simulation.report().steps_from(first).to_vec());
         json(py, &steps)
     }
 
@@ -192,9 +192,9 @@ impl PySimulation {
         crate::bending::hinges_to_numpy(py, &hinges)
     }
 
-    /// Everything, as bytes.
-    fn checkpoint<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        let bytes = self.read(py, Simulation::checkpoint);
+    /// Everything but the reports of the steps before number `first`, as bytes.
+    fn checkpoint<'py>(&self, py: Python<'py>, first: usize) -> Bound<'py, PyBytes> {
+        let bytes = self.read(py, |simulation| simulation.checkpoint_from(first));
         PyBytes::new(py, &bytes)
     }
 }

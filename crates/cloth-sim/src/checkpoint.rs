@@ -10,12 +10,20 @@ use cloth_core::mesh::TriMesh;
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
-    /// Scene, assets, options and the full state as bytes: [`Simulation::resume`] goes on to the same bits.
+    /// Scene, assets, options, the full state and the report as bytes: [`Simulation::resume`] goes on to the same bits.
+    ///
+    /// The report of each step is in it, so it grows with the run: see [`Simulation::checkpoint_from`].
     pub fn checkpoint(&self) -> Vec<u8> {
+        self.checkpoint_from(0)
+    }
+
+    /// [`Simulation::checkpoint`] without the reports of the steps before number `first` (from 0). Totals and effects have
+    /// them all the same; a caller that has kept those reports has the whole.
+    pub fn checkpoint_from(&self, first: usize) -> Vec<u8> {
         let mut payload = Writer::default();
         payload.text(&serde_json::to_string(&self.scene).unwrap_or_default());
         payload.u64(self.options.threads.map_or(0, |n| n as u64));
@@ -31,7 +39,7 @@ impl Simulation {
         payload.f64(pending.dt);
         payload.f64(pending.end);
         payload.assets(&self.assets);
-        payload.text(&serde_json::to_string(&self.report).unwrap_or_default());
+        payload.text(&serde_json::to_string(&self.report.without_steps_before(first)).unwrap_or_default());
 
         let payload = payload.0;
         let mut bytes = Vec::with_capacity(HEADER + payload.len() + 8);

@@ -5,8 +5,11 @@ use serde::{Deserialize, Serialize};
 /// Everything a run reports.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Report {
-    /// One entry per step (of `advance`'s size; sub-steps of a retried step are summed in it).
+    /// One entry per step (of `advance`'s size; sub-steps of a retried step are summed in it), without the first ones that
+    /// a checkpoint has left out.
     pub steps: Vec<StepReport>,
+    /// How many steps before `steps[0]` were left out; the totals have them.
+    pub left_out: usize,
     /// Sums and extremes over all steps.
     pub totals: Totals,
     /// What each effect costs.
@@ -149,6 +152,19 @@ const STAGES: [(&str, &str); 10] = [
 ];
 
 impl Report {
+    /// The reports of the steps from number `first` (from 0, those left out counted) on.
+    pub fn steps_from(&self, first: usize) -> &[StepReport] {
+        &self.steps[first.saturating_sub(self.left_out).min(self.steps.len())..]
+    }
+
+    /// The same without the steps before number `first`.
+    pub(crate) fn without_steps_before(&self, first: usize) -> Self {
+        let steps = self.steps_from(first).to_vec();
+        let left_out = self.left_out + self.steps.len() - steps.len();
+        let (totals, effects, threads) = (self.totals.clone(), self.effects.clone(), self.threads);
+        Self { steps, left_out, totals, effects, threads }
+    }
+
     /// Notes the memory that an effect holds now [B].
     pub(crate) fn grow(&mut self, effect: &str, bytes: usize) {
         if let Some(effect) = self.effects.iter_mut().find(|e| e.name == effect) {

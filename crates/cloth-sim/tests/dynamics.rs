@@ -271,3 +271,25 @@ fn scenes_of_the_examples_folder_are_read() {
     }
     assert!(count >= 4, "examples: {count}");
 }
+
+#[test]
+fn a_checkpoint_may_leave_out_the_steps_that_are_kept_elsewhere() {
+    let scene = scene(&hanging(5, "implicit-euler", 0.01));
+    let mut sim = build(&scene, 1);
+    advance(&mut sim, 0.2).unwrap();
+    let short = sim.checkpoint_from(15);
+    assert!(short.len() + 10 * 200 < sim.checkpoint().len(), "each step takes room");
+    let mut resumed = Simulation::resume(&short, None).unwrap();
+    assert_eq!(resumed.report().left_out, 15);
+    assert_eq!(resumed.report().steps, sim.report().steps[15..]);
+    assert_eq!(resumed.report().totals, sim.report().totals);
+    advance(&mut sim, 0.1).unwrap();
+    advance(&mut resumed, 0.1).unwrap();
+    assert_eq!(bits(&sim), bits(&resumed));
+    let numbers = |list: &[cloth_sim::StepReport]| list.iter().map(|s| s.step).collect::<Vec<_>>();
+    assert_eq!(numbers(resumed.report().steps_from(18)), (19..=30).collect::<Vec<_>>());
+    assert_eq!(resumed.report().steps_from(0).len(), 15, "what there is");
+    assert_eq!(resumed.report().steps_from(99), []);
+    let again = Simulation::resume(&resumed.checkpoint(), None).unwrap();
+    assert_eq!(again.report(), resumed.report());
+}

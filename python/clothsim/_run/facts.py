@@ -20,6 +20,11 @@ class FrameFacts:
         self._wall = float(header["wall_seconds"])
         self._started = time.monotonic()
 
+    @property
+    def steps(self) -> int:
+        """Steps that the frames so far have told of: a checkpoint needs the reports of later ones only."""
+        return self._steps
+
     def wall_seconds(self) -> float:
         """Wall-clock seconds spent so far, earlier sessions included."""
         return self._wall + time.monotonic() - self._started

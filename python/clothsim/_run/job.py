@@ -155,7 +155,7 @@ class Job:
 
         def checkpoint() -> None:
             writer.sync()
-            folder.save_checkpoint(facts.header(writer.frames, fingerprint), simulation._core.checkpoint())
+            folder.save_checkpoint(facts.header(writer.frames, fingerprint), simulation._core.checkpoint(facts.steps))
 
         try:
             error = self._simulate(simulation, lengths, writer, facts, checkpoint, every)

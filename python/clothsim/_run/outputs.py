@@ -87,7 +87,7 @@ class Outputs:
                 text = getattr(error, "strerror", None) or str(error)
                 failures.append(f"{name}: {text}")
         if self._error is not None:
-            write_whole(self._out / "last_good.checkpoint", self._simulation._core.checkpoint())
+            write_whole(self._out / "last_good.checkpoint", self._simulation._core.checkpoint(0))
             written.append("last_good.checkpoint")
         if failures:
             raise OutputError(
