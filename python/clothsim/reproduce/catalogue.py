@@ -54,7 +54,11 @@ class Entry:
     @property
     def name(self) -> str:
         """What the command line calls it: ``4.7``, ``table-4.1``, ``2010-4``, ``2010-table-2``."""
-        return ("2010-" if self.paper == SKIPPING else "") + ("" if self.kind == "figure" else f"{self.kind}-") + self.number
+        return (
+            ("2010-" if self.paper == SKIPPING else "")
+            + ("" if self.kind == "figure" else f"{self.kind}-")
+            + self.number
+        )
 
     @property
     def stem(self) -> str:
@@ -77,7 +81,9 @@ class Entry:
         if self.state != REPRODUCED:
             known = ", ".join(entry.name for entry in CATALOGUE if entry.state == REPRODUCED)
             why = (
-                "is not reproduced yet" if self.state == NOT_YET else f"is {_ARTICLE[self.state]}: there is nothing to measure"
+                "is not reproduced yet"
+                if self.state == NOT_YET
+                else f"is {_ARTICLE[self.state]}: there is nothing to measure"
             )
             expected = f"a figure or table that is reproduced ({known})"
             raise InvalidInput(
@@ -198,5 +204,8 @@ def find(name: str) -> Entry:
     near = difflib.get_close_matches(wanted, names, n=1, cutoff=0.0)[0]
     expected = "a name that clothsim reproduce --list names"
     raise InvalidInput(
-        f"FIGURE: expected {expected}, got {name!r} (did you mean {near!r}?)", name="FIGURE", expected=expected, got=name
+        f"FIGURE: expected {expected}, got {name!r} (did you mean {near!r}?)",
+        name="FIGURE",
+        expected=expected,
+        got=name,
     )

@@ -103,8 +103,7 @@ class Specimen:
         assert self.hung is not None
         lines = self.hung.reshape(setup.rows + 1, setup.cells + 1, 3).mean(axis=0)
         first, last = (
-            lines[b] - lines[a]
-            for a, b in ((setup.cells // 8, setup.cells // 3), (2 * setup.cells // 3, setup.cells))
+            lines[b] - lines[a] for a, b in ((setup.cells // 8, setup.cells // 3), (2 * setup.cells // 3, setup.cells))
         )
         cosine = float(first @ last / np.linalg.norm(first) / np.linalg.norm(last))
         return math.acos(max(-1.0, min(1.0, cosine)))
@@ -229,7 +228,8 @@ def _scene(model: str, cycles: int, setup: Setup) -> Scene:
         mesh=floor,
         position=(0.0, start, 0.0),
         keyframes=[
-            {"time": t, "position": [0.0, start, 0.0], "rotation": {"axis": [0, 0, 1], "angle": angle}} for t, angle in door
+            {"time": t, "position": [0.0, start, 0.0], "rotation": {"axis": [0, 0, 1], "angle": angle}}
+            for t, angle in door
         ],
     )
     return scene

@@ -106,9 +106,7 @@ def here(measured: Measured) -> str:
 def checks(measured: Measured) -> Sequence[Check]:
     """What the thesis finds."""
     hysteresis, n = measured.rest("hysteresis"), [s.cycles for s in measured.specimens["hysteresis"]]
-    rates = [
-        (b - a) / (m - k) for a, b, k, m in zip([0.0, *hysteresis], hysteresis, [0, *n], n, strict=False)
-    ]
+    rates = [(b - a) / (m - k) for a, b, k, m in zip([0.0, *hysteresis], hysteresis, [0, *n], n, strict=False)]
     plastic = measured.specimens["plastic"][-1].lifted["rest_curvature"]
     first, last = (measured.rest_angle(plastic[k]) for k in (0, -1))
     angles = measured.angles("hysteresis")

@@ -225,7 +225,14 @@ def _draw_path(axis: Any, panel: Panel) -> None:
     for end in ends:
         axis.plot(k[start : end + 1], m[start : end + 1], color=pictures.LAWS["hysteresis"], linewidth=1.8)
         if end + 1 < len(k):
-            axis.plot(k[end : end + 2], m[end : end + 2], color=pictures.LAWS["linear"], linewidth=2.0, linestyle=(0, (1, 0.7)), zorder=6)
+            axis.plot(
+                k[end : end + 2],
+                m[end : end + 2],
+                color=pictures.LAWS["linear"],
+                linewidth=2.0,
+                linestyle=(0, (1, 0.7)),
+                zorder=6,
+            )
         start = end + 1
     for name, index in panel.turns.items():
         if name.startswith("K") and len(name) == 2 and name != "Km":
@@ -239,7 +246,9 @@ def _draw_path(axis: Any, panel: Panel) -> None:
 
 def _annotate_loop(axis: Any, measured: Measured) -> None:
     fabric, blue = FABRIC, pictures.LAWS["linear"]
-    axis.fill(*_between(measured.panels["b"], "Km", "Km again"), color=pictures.LAWS["hysteresis"], alpha=0.08, linewidth=0)
+    axis.fill(
+        *_between(measured.panels["b"], "Km", "Km again"), color=pictures.LAWS["hysteresis"], alpha=0.08, linewidth=0
+    )
     axis.plot(fabric.k0, fabric.ma, "o", color=blue, markersize=4.5, zorder=5)
     axis.annotate(
         "$(K_0, M_a)$", (fabric.k0, fabric.ma), xytext=(8, -6), textcoords="offset points", fontsize=10.5, color=blue,
@@ -250,7 +259,13 @@ def _annotate_loop(axis: Any, measured: Measured) -> None:
         arrowprops={"arrowstyle": "<->", "color": blue, "linewidth": 1.4, "shrinkA": 0, "shrinkB": 0},
     )  # fmt: skip
     axis.annotate(
-        "$2M_0$", (0.0, -0.5 * fabric.m0), xytext=(6, 0), textcoords="offset points", fontsize=10.5, color=blue, va="center"
+        "$2M_0$",
+        (0.0, -0.5 * fabric.m0),
+        xytext=(6, 0),
+        textcoords="offset points",
+        fontsize=10.5,
+        color=blue,
+        va="center",
     )
     text = (
         f"measured (closed form)\n$K_0$ = {measured.k0:.4f} ({fabric.k0:.4f}) /cm\n"

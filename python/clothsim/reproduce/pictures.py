@@ -14,7 +14,8 @@ from clothsim.recording import Body, Recording
 __all__ = ["FAINT", "GRID", "INK", "LAWS", "caption", "figure", "png", "show", "tidy", "tiles"]
 
 INK, FAINT, GRID = "#343230", "#8c8882", "#e4e1db"
-# One colour per bending law, and two more.
+_MARGIN = 1.12  # of a tile's frame over what is seen in it
+# One colour per bending law.
 LAWS = {"linear": "#2f5d8c", "nonlinear": "#3f7a57", "plastic": "#c08a2e", "hysteresis": "#9c2f35"}
 
 
@@ -84,7 +85,11 @@ def tiles(
     """
     from clothsim._export import film_strip
 
-    recording = Recording(list(bodies), np.arange(len(states), dtype=float), np.array(states), standing)
+    # The camera comes as near as all frames allow: frames that are a little larger, not rendered, leave a margin.
+    count = sum(body.vertex_count for body in bodies if body.kind == "cloth")
+    middle = np.mean([state[:count].mean(axis=0) for state in states], axis=0)
+    larger = [middle + _MARGIN * (state - middle) for state in states]
+    recording = Recording(list(bodies), np.arange(2 * len(states), dtype=float), np.array([*states, *larger]), standing)
     return [film_strip.render(recording, index, size) for index in range(len(states))]
 
 

@@ -1,0 +1,243 @@
+"""``clothsim reproduce``: the catalogue, the files, the closed forms, and faults that must show."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clothsim import bending
+from clothsim._cli import main
+from clothsim.errors import InvalidInput
+from clothsim.reproduce import CATALOGUE, Check, Effort, Table, find, reproduce
+from clothsim.reproduce.contract import Reproduction
+
+# Figures and tables per chapter, from the lists at the start of the thesis.
+THESIS_FIGURES = {2: 1, 3: 4, 4: 14, 5: 16, 6: 11, 7: 8}
+THESIS_TABLES = {4: 1, 5: 2, 6: 3, 7: 2}
+REPRODUCED = [entry.name for entry in CATALOGUE if entry.state == "reproduced"]
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
+
+
+def column(table: list[dict[str, str]], name: str) -> Any:
+    return np.array([float(row[name]) for row in table])
+
+
+def loop_integral(x: Any, y: Any) -> float:
+    return float(np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(x)))
+
+
+# Catalogue ------------------------------------------------------------------------------------------------------
+
+
+def test_the_list_names_every_figure_and_table(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", "--list", "--json"]) == 0
+    listed = json.loads(capsys.readouterr().out)
+    expected = {f"{c}.{k}" for c, n in THESIS_FIGURES.items() for k in range(1, n + 1)}
+    expected |= {f"table-{c}.{k}" for c, n in THESIS_TABLES.items() for k in range(1, n + 1)}
+    expected |= {f"2010-{k}" for k in range(1, 8)} | {"2010-table-1", "2010-table-2", "2010-section-9.3"}
+    assert {entry["name"] for entry in listed} == expected
+    assert len(listed) == len(expected), "no name twice"
+    for entry in listed:
+        assert entry["state"] in ("reproduced", "drawing", "photograph", "input", "not yet")
+        assert (entry["command"] is not None) == (entry["state"] == "reproduced")
+    assert main(["reproduce", "--list"]) == 0
+    text = capsys.readouterr().out
+    assert all(entry["title"] in text for entry in listed)
+    assert "clothsim reproduce 4.7 -o out/figure-4.7" in text
+
+
+@pytest.mark.parametrize("name", REPRODUCED)
+def test_a_reproduced_figure_has_the_names_of_the_contract(name: str) -> None:
+    module = find(name).load()
+    functions = [key for key, value in vars(Reproduction).items() if callable(value) and not key.startswith("_")]
+    assert set(functions) == {"measure", "parameters", "tables", "draw", "here", "checks"}
+    assert all(callable(getattr(module, key)) for key in functions)
+    assert module.THESIS
+
+
+@pytest.mark.parametrize("spelled", ["4.7", "Figure 4.7", "fig. 4.7", "FIG 4.7"])
+def test_figures_are_understood(spelled: str) -> None:
+    assert find(spelled).stem == "figure-4.7"
+
+
+def test_tables_are_told_from_figures() -> None:
+    assert find("Table 4.1").kind == "table"
+    assert find("4.1").kind == "figure"
+    assert find("2010 table 2").paper == "Wong 2010"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["4.77"], "did you mean '4.7'?"),
+        (["table-4.2"], "did you mean 'table-4.1'?"),
+        (["4.3"], "a drawing: there is nothing to measure"),
+        (["table-7.1"], "what an experiment was given"),
+        (["6.10"], "not reproduced yet; reproduced are 4.7"),
+        ([], "expected a name"),
+        (["4.7", "-o", ""], "expected the name of a folder"),
+    ],
+)  # fmt: skip
+def test_bad_names_are_answered(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    out = tmp_path / "out"
+    assert main(["reproduce", *arguments, *([] if "-o" in arguments else ["-o", str(out)])]) == 2
+    assert words in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_no_folder_no_work(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", "4.7"]) == 2
+    assert "expected an output folder, got nothing: clothsim reproduce 4.7 -o out/figure-4.7" in capsys.readouterr().err
+
+
+# Files ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Folders with the quick variants, each made once."""
+    made: dict[str, Path] = {}
+
+    def of(name: str) -> Path:
+        if name not in made:
+            made[name] = tmp_path_factory.mktemp(name) / "out"
+            reproduce(name, made[name], Effort(quick=True))
+        return made[name]
+
+    return of
+
+
+@pytest.mark.parametrize("name", REPRODUCED)
+def test_quick_variants_agree_with_the_paper(quick: Any, name: str) -> None:
+    entry, out = find(name), quick(name)
+    facts = json.loads((out / f"{entry.stem}.json").read_text())
+    assert facts["line"].startswith("the thesis: ")
+    assert " / here: " in facts["line"]
+    assert [check for check in facts["checks"] if not check["passed"]] == []
+    assert facts["checks"]
+    assert (out / f"{entry.stem}.png").read_bytes().startswith(b"\x89PNG")
+    head = (out / f"{entry.stem}.csv").read_text()
+    assert head.startswith("# figure: Wong 2014, ")
+    assert f"# made by: clothsim {facts['parameters']['made by'].split()[1]}" in head
+    assert "--quick" in facts["parameters"]["made by"]
+    assert rows(out / f"{entry.stem}.csv")
+    assert not (out / ".clothsim").exists()
+
+
+def test_the_command_prints_the_line_and_never_overwrites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["reproduce", "4.7", "-o", str(out), "--quick", "--quiet"]) == 0
+    assert capsys.readouterr().out.startswith("the thesis: ")
+    before = (out / "figure-4.7.csv").read_bytes()
+    assert main(["reproduce", "4.7", "-o", str(out), "--quick", "--quiet"]) == 2
+    assert "--overwrite replaces it" in capsys.readouterr().err
+    assert main(["reproduce", "4.7", "-o", str(out), "--quick", "--overwrite", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["passed"] is True
+    assert (out / "figure-4.7.csv").read_bytes() == before, "equal input, equal bytes"
+
+
+def test_a_folder_with_a_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "report.json").write_text("{}")
+    assert main(["reproduce", "4.7", "-o", str(tmp_path), "--quick", "--overwrite"]) == 2
+    assert "holds a run of a scene" in capsys.readouterr().err
+
+
+def test_a_failure_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise InvalidInput("planted")
+
+    monkeypatch.setattr(bending, "trace", fail)
+    with pytest.raises(InvalidInput, match="planted"):
+        reproduce("4.7", tmp_path / "out", Effort(quick=True))
+    assert not (tmp_path / "out").exists()
+
+
+# Closed forms, read from the files ------------------------------------------------------------------------------
+
+
+def test_figure_4_7_is_the_loop_of_its_coefficients(quick: Any) -> None:
+    table = rows(quick("4.7") / "figure-4.7.csv")
+    loop = [row for row in table if row["panel"] == "b"]
+    k, m = column(loop, "K [1/cm]"), column(loop, "M [gf cm/cm]")
+    start, end = (next(i for i, row in enumerate(loop) if row["turning point"] == name) for name in ("Km", "Km again"))
+    m0, k0 = (0.76 - 0.26) ** 2 / (4 * 0.38), (0.76 - 0.26) / (2 * 0.38)
+    trapezoids = 1e-4  # |c1| h²/12 a sample over 10/cm of way, h = 1/200 cm
+    assert loop_integral(k[start : end + 1], m[start : end + 1]) == pytest.approx(
+        4 * m0 * (2.5 - 2 / 3 * k0), abs=trapezoids
+    )
+    assert m[start] == pytest.approx(m0 + 0.26 * 2.5, rel=1e-9)
+    assert column(loop, "M [N]") == pytest.approx(m * 9.80665e-3, rel=1e-8)
+    assert column(loop, "K [1/m]") == pytest.approx(k * 100.0, rel=1e-8)
+    turns = [row["turning point"] for row in table if row["panel"] == "d" and row["turning point"]]
+    assert turns == ["0", "Ka", "Kb", "Kc", "Kd", "Ke", "Kf", "Kg"]
+
+
+def test_figure_4_14_falls_as_fatigue_says(quick: Any) -> None:
+    table = rows(quick("4.14") / "figure-4.14.csv")
+    n, couple = column(table, "n"), column(table, "2 M0 [gf cm/cm]")
+    m0 = (5.20 - 2.51) ** 2 / (4 * 4.45)
+    assert couple[0] == pytest.approx(2 * m0, rel=1e-9)
+    # A recovery that is cut short takes less friction, none takes more.
+    assert np.all(couple >= 2 * m0 * 0.9**n * (1 - 1e-9))
+    assert np.all(np.diff(couple) <= 0.0)
+    # b1 − b2 goes with the square root of M0.
+    assert column(table, "b1 [gf cm2/cm]") == pytest.approx(2.51 + 2.69 * np.sqrt(couple / (2 * m0)), rel=1e-9)
+    assert column(table, "residual angle [rad]") == pytest.approx(
+        column(table, "rest curvature [1/cm]") * 0.4, rel=1e-8
+    )
+
+
+# Planted faults -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fault", "caught"),
+    [
+        (lambda t: replace(t, moment=t.moment * 1.0001), "M0 [gf cm/cm]"),
+        (lambda t: replace(t, dissipated=t.dissipated * (1 + 1e-6)), "dissipated in the loop"),
+        (lambda t: replace(t, rest_curvature=t.rest_curvature * 1.001), "rest curvature after the first cycle"),
+        (lambda t: replace(t, moment=np.where(np.abs(t.curvature) < 30.0, t.moment, t.moment + 1e-4)), "dM/dK"),
+    ],
+)  # fmt: skip
+def test_a_wrong_law_fails_figure_4_7(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], fault: Any, caught: str
+) -> None:
+    right = bending.trace
+    monkeypatch.setattr(bending, "trace", lambda *a, **k: fault(right(*a, **k)))
+    assert main(["reproduce", "4.7", "-o", str(tmp_path / "out"), "--quick", "--quiet"]) == 1
+    differs = [line for line in capsys.readouterr().out.splitlines() if "DIFFERS" in line]
+    assert any(caught in line for line in differs), differs
+
+
+def test_the_law_alone_catches_a_wrong_hinge(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = bending.trace
+    monkeypatch.setattr(bending, "trace", lambda *a, **k: right(*a, **{**k, "plasticity": 0.1501}))
+    outcome = reproduce("4.14", tmp_path / "out", Effort(quick=True))
+    assert [check.what for check in outcome.checks if not check.passed] == [
+        "rest curvature: the hinge against the law alone on its path"
+    ]
+
+
+def test_checks_can_fail() -> None:
+    assert Check("x", 1.0, 1.1, 0.2, "").passed
+    assert not Check("x", 1.0, 1.3, 0.2, "").passed
+    assert not Check("x", float("nan"), 1.0, 10.0, "").passed
+    assert not Check.true("x", found=False, reason="").passed
+
+
+def test_tables_carry_their_parameters() -> None:
+    text = Table(("a [m]", "b"), [(0.1, "x"), (2, "y")]).text({"c1 [N m2]": -0.5, "chosen": "c1"})
+    assert text == "# c1 [N m2]: -0.5\n# chosen: c1\na [m],b\n0.1,x\n2,y\n"
