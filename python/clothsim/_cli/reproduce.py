@@ -20,12 +20,18 @@ EXAMPLE = "clothsim reproduce 4.7 -o out/figure-4.7"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The figure, output folder, and how to run."""
     parser.add_argument("figure", metavar="FIGURE", nargs="?", help="4.7, table-4.1, 2010-7, … (see --list)")
-    parser.add_argument("-o", "--out", metavar="OUT", type=Path, help="output folder")
+    parser.add_argument("-o", "--out", metavar="OUT", type=_folder, help="output folder")
     parser.add_argument("--list", action="store_true", help="list every figure and table of both papers with its state")
     parser.add_argument("--quick", action="store_true", help="a coarse variant of the same experiment, in seconds")
     parser.add_argument("--overwrite", action="store_true", help="replace the figure if OUT holds it")
     parser.add_argument("--threads", metavar="N", type=int, help="how many threads (default: all)")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def _folder(text: str) -> Path:
+    if not text.strip():
+        raise argparse.ArgumentTypeError(f"expected a folder, got {text!r}")
+    return Path(text)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -54,7 +60,9 @@ def _text(outcome: Outcome) -> str:
     lines = [outcome.line]
     for check in outcome.checks:
         verdict = "agrees" if check.passed else "DIFFERS"
-        lines.append(f"  {verdict}: {check.what} {check.here:.6g}, expected {check.expected:.6g} ± {check.tolerance:.2g}")
+        lines.append(
+            f"  {verdict}: {check.what} {check.here:.6g}, expected {check.expected:.6g} ± {check.tolerance:.2g}"
+        )
     lines += [f"  {path}" for path in outcome.files]
     return "\n".join([*lines, f"  {outcome.seconds:.1f} s"])
 

@@ -9,7 +9,8 @@
 | `pictures` | one style for plots and rendered tiles |
 | `figure_…`, `table_…` | one figure or table each |
 
-A figure that becomes reproducible is one module with the names of `contract.Reproduction` and one word in the catalogue.
+A figure that becomes reproducible is one more module, with the names of `contract.Reproduction`, and its name in the
+catalogue.
 """
 
 from clothsim.reproduce.catalogue import CATALOGUE, Entry, find

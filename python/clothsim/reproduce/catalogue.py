@@ -38,8 +38,8 @@ class Entry:
     title : str
         What it shows.
     state : str
-        ``"reproduced"``; ``"drawing"``, ``"photograph"`` or ``"input"`` (parameters, data sheets) where there is nothing to
-        measure; ``"not yet"``.
+        ``"reproduced"``; ``"drawing"``, ``"photograph"`` or ``"input"`` (parameters, data sheets) where there is
+        nothing to measure; ``"not yet"``.
     module : str
         The module that reproduces it.
     """
@@ -54,16 +54,16 @@ class Entry:
     @property
     def name(self) -> str:
         """What the command line calls it: ``4.7``, ``table-4.1``, ``2010-4``, ``2010-table-2``."""
-        return (
-            ("2010-" if self.paper == SKIPPING else "")
-            + ("" if self.kind == "figure" else f"{self.kind}-")
-            + self.number
-        )
+        return self._prefix + ("" if self.kind == "figure" else f"{self.kind}-") + self.number
 
     @property
     def stem(self) -> str:
         """Beginning of its files' names: ``figure-4.7``."""
-        return ("2010-" if self.paper == SKIPPING else "") + f"{self.kind}-{self.number}"
+        return f"{self._prefix}{self.kind}-{self.number}"
+
+    @property
+    def _prefix(self) -> str:
+        return "2010-" if self.paper == SKIPPING else ""
 
     @property
     def command(self) -> str | None:

@@ -32,7 +32,7 @@ class Reproduction(Protocol):
         """Do the work, and return what the other functions take."""
 
     def parameters(self, measured: Any) -> Mapping[str, Any]:
-        """Everything that was chosen, with units in the names: the paper's parameters, and those that it leaves open."""
+        """Everything that was chosen, units in the names: the paper's parameters, and those that it leaves open."""
 
     def tables(self, measured: Any) -> Mapping[str, Table]:
         """Tables by the end of their file's name; "" for the only or main one."""
@@ -118,6 +118,10 @@ class Check:
         return cls(what, float(found), 1.0, 0.0, reason)
 
 
+def _threads() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 @dataclass(frozen=True)
 class Effort:
     """How much work may be spent.
@@ -133,7 +137,7 @@ class Effort:
     """
 
     quick: bool = False
-    threads: int = field(default_factory=lambda: _threads())
+    threads: int = field(default_factory=_threads)
     progress: bool = False
 
     def bar(self, total: int, name: str, unit: str = "step") -> Any:
@@ -151,7 +155,3 @@ class Effort:
             yield from pool.map(work, items)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _threads() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

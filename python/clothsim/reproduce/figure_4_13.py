@@ -19,8 +19,8 @@ from clothsim.reproduce.contract import Check, Effort, Table
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
 
 THESIS = (
-    "with hysteresis (b1 = 5.20, b2 = 2.51, c1 = −4.45, λ = 0.15, μ = 0.1) the residual wrinkle grows with n, most in the "
-    "first cycle, ever less after it; with plasticity the increase depends only on how far the cloth is bent"
+    "with hysteresis (b1 = 5.20, b2 = 2.51, c1 = −4.45, λ = 0.15, μ = 0.1) the residual wrinkle grows with n, most in "
+    "the first cycle, ever less after it; with plasticity the increase depends only on how far the cloth is bent"
 )
 
 LAWS = ("plastic", "hysteresis")
@@ -55,7 +55,7 @@ def measure(effort: Effort) -> Measured:
     try:
         # The longest first, so that all threads are busy to the end.
         order = sorted(jobs, key=lambda job: -job[1])
-        found = effort.each(lambda job: clamping.clamp(*job, setup, hang=True, tick=bar.update), order)
+        found = effort.each(lambda job: clamping.clamp(job[0], job[1], setup, hang=True, tick=bar.update), order)
         done = dict(zip(order, found, strict=True))
     finally:
         bar.close()
@@ -112,7 +112,7 @@ def checks(measured: Measured) -> Sequence[Check]:
     angles = measured.angles("hysteresis")
     return [
         Check.true("hysteresis: the rest shape's fold grows with n", all(r > 0.0 for r in rates), "thesis 4.5.4"),
-        Check.true("hysteresis: most in the first cycle, ever less", rates == sorted(rates, reverse=True), "thesis 4.5.4"),
+        Check.true("hysteresis: most at first, ever less", rates == sorted(rates, reverse=True), "thesis 4.5.4"),
         Check.true("hysteresis: the hung fold grows with n", angles == sorted(angles), "thesis 4.5.4"),
         Check("plastic: fold at rest after the last over after the first cycle", last / first, 1.0, 0.25,
               "clamped as far each time, it flows once; the strip's creep between the planes moves the fold a little"),
@@ -147,7 +147,7 @@ def draw(measured: Measured) -> bytes:
 
 
 def _render(measured: Measured) -> dict[str, list[Any]]:
-    """Tiles by law: a wider strip (its shape does not vary across) turned towards the camera, and a rod it hangs from."""
+    """Tiles by law: the strip wider (its shape does not vary across), turned to the camera, hanging from a rod."""
     setup = measured.setup
     copies = 11
     width = 0.05

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def trace(title: str, turns: Mapping[str, float], fabric: Loop, per_unit: int) -
     """Follow the law along a path given by its turning points [1/cm], with so many samples per 1/cm."""
     points = list(turns.values())
     path, at = [np.array(points[:1])], [0]
-    for start, end in zip(points, points[1:], strict=False):
+    for start, end in pairwise(points):
         count = max(2, math.ceil(abs(end - start) * per_unit))
         path.append(np.linspace(start, end, count + 1)[1:])
         at.append(at[-1] + count)
@@ -157,8 +158,8 @@ def here(measured: Measured) -> str:
     moves = np.count_nonzero(np.diff(measured.panels["d"].rest))
     return (
         f"K0 = {measured.k0:.3f} /cm (closed form {FABRIC.k0:.3f}), M0 = {measured.m0:.4f} gf cm/cm ({FABRIC.m0:.4f}), "
-        f"loop area {measured.area:.4f} gf/cm ({FABRIC.area(PEAK):.4f}), no kink at any join; {moves} disconnections with "
-        f"λ = {PLASTICITY}, none without"
+        f"loop area {measured.area:.4f} gf/cm ({FABRIC.area(PEAK):.4f}), no kink at any join; {moves} disconnections "
+        f"with λ = {PLASTICITY}, none without"
     )
 
 
@@ -186,7 +187,7 @@ def checks(measured: Measured) -> Sequence[Check]:
 
 def draw(measured: Measured) -> bytes:
     """Three panels side by side, KES units with SI on the other sides."""
-    note = "Curvature from the rest shape in (b), (c); from the residual angle θr in (d), where dotted lines are its jumps."
+    note = "Curvature from the rest shape; in (d) from the residual angle θr, whose jumps are the dotted lines."
     figure = pictures.figure("Figure 4.7: bending hysteresis of one element", (17.5, 6.4), note)
     figure.get_layout_engine().set(wspace=0.06)
     axes = figure.subplots(1, 3)
@@ -239,7 +240,7 @@ def _draw_path(axis: Any, panel: Panel) -> None:
             right = k[index] > k[max(index - 10, 0)]  # the upper line passes there: its labels go to the left
             axis.plot(k[index], m[index], "o", color=pictures.LAWS["linear"], markersize=4.5, zorder=5)
             axis.annotate(
-                f"$K_{name[1]}$", (k[index], m[index]), annotation_clip=True, xytext=(-6 if right else 6, 8 if right else -8), fontsize=12,
+                f"$K_{name[1]}$", (k[index], m[index]), xytext=(-6 if right else 6, 8 if right else -8), fontsize=12,
                 textcoords="offset points", ha="right" if right else "left", va="center", color=pictures.LAWS["linear"],
             )  # fmt: skip
 

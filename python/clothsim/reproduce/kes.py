@@ -58,16 +58,16 @@ class Loop:
 
     def residual(self, cycles: float) -> float:
         """Rest curvature after complete one-sided cycles, λ (M0/b2) (1 − (1−μ)ⁿ)/μ [1/cm]: (4.6) with (4.11) summed."""
-        decay = cycles if self.fatigue == 0.0 else (1.0 - (1.0 - self.fatigue) ** cycles) / self.fatigue
+        decay = cycles if self.fatigue == 0.0 else (1.0 - math.pow(1.0 - self.fatigue, cycles)) / self.fatigue
         return self.plasticity * self.m0 / self.b2 * decay
 
     def stiffness(self, cycles: float) -> float:
         """Initial rigidity after complete cycles, b2 + (1−μ)^(n/2) (b1 − b2) [gf cm²/cm]: (4.12) repeated."""
-        return self.b2 + math.sqrt((1.0 - self.fatigue) ** cycles) * (self.b1 - self.b2)
+        return self.b2 + math.pow(1.0 - self.fatigue, 0.5 * cycles) * (self.b1 - self.b2)
 
     def couple(self, cycles: float) -> float:
         """Coercive couple 2 M0 after complete cycles, (1−μ)ⁿ 2 M0 [gf cm/cm]: (4.11) repeated."""
-        return (1.0 - self.fatigue) ** cycles * 2.0 * self.m0
+        return math.pow(1.0 - self.fatigue, cycles) * 2.0 * self.m0
 
     # SI --------------------------------------------------------------------------------------------------------
 

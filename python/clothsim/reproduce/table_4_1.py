@@ -138,9 +138,9 @@ def tables(measured: Measured) -> Mapping[str, Table]:
         low, high = np.percentile(times, [25, 75])
         rows.append(
             (
-                "with" if law == "hysteresis" else "without", alpha, measured.median(law, alpha), float(low), float(high),
-                measured.share(law, alpha), float(np.median(measured.step[law, alpha])), measured.iterations[law, alpha],
-                *PRINTED[law, alpha],
+                "with" if law == "hysteresis" else "without", alpha, measured.median(law, alpha), float(low),
+                float(high), measured.share(law, alpha), float(np.median(measured.step[law, alpha])),
+                measured.iterations[law, alpha], *PRINTED[law, alpha],
             )
         )  # fmt: skip
     return {"": Table(columns, rows)}
@@ -155,9 +155,10 @@ def here(measured: Measured) -> str:
         words.append(f"{times} ms ({shares} %) {'with it' if law == 'hysteresis' else 'without hysteresis'}")
     added = 100.0 * (measured.median("hysteresis", 1) / measured.median("linear", 1) - 1.0)
     step = {law: float(np.median(measured.step[law, 1])) for law in LAWS}
+    whole = 100.0 * (step["hysteresis"] / step["linear"] - 1.0)
     return (
-        f"{measured.triangles:,} triangles: {', '.join(words)}, on {measured.threads} CPU threads; hysteresis adds {added:.0f} % "
-        f"to the bending (the thesis: 51 %) and {100.0 * (step['hysteresis'] / step['linear'] - 1.0):.0f} % to a step at α = 1"
+        f"{measured.triangles:,} triangles: {', '.join(words)}, on {measured.threads} CPU threads; hysteresis adds "
+        f"{added:.0f} % to the bending (the thesis: 51 %) and {whole:.0f} % to a step at α = 1"
     )
 
 
