@@ -125,7 +125,8 @@ impl ContactStage {
         intersections(&self.mesh, x, pool).map_err(|e| stage("intersections", &e))
     }
 
-    /// Memory of the collision topology and of the response's buffers, which grow with the contacts [B].
+    /// Memory of the collision topology, of the detection's tree and boxes, and of the response's buffers, which grow with
+    /// the contacts [B].
     pub(crate) fn bytes(&self) -> usize {
         let mesh = &self.mesh;
         size_of_val(&mesh.triangles[..])
@@ -135,6 +136,7 @@ impl ContactStage {
             + size_of_val(&mesh.attached_to[..])
             + size_of_val(&mesh.vertex_owner[..])
             + size_of_val(&mesh.edge_owner[..])
+            + self.bvh.bytes()
             + self.responder.bytes()
     }
 }

@@ -220,8 +220,9 @@ fn the_plan_lists_what_runs_and_nothing_else() {
     }
 }
 
-/// Least memory of a vertex in contact [B]: rest position, three vectors of the motion, its marks.
-const VERTEX_BYTES: usize = 24 + 3 * 24 + 4 + 1;
+/// Least memory of a vertex in contact [B]: rest position, three vectors of the motion, its marks; boxes of two ends and of
+/// one, in single precision.
+const VERTEX_BYTES: usize = 24 + 3 * 24 + 4 + 1 + 3 * 24;
 
 #[test]
 fn contact_counts_the_memory_of_its_buffers() {

@@ -49,6 +49,20 @@ pub(super) struct Root {
 }
 
 impl Tree {
+    /// Memory \[B\].
+    pub(super) fn bytes(&self) -> usize {
+        fn held<T>(list: &Vec<T>) -> usize {
+            list.capacity() * size_of::<T>()
+        }
+        held(&self.leaves)
+            + held(&self.triangle_ids)
+            + held(&self.corners)
+            + held(&self.vertex_ids)
+            + held(&self.edge_ids)
+            + held(&self.inner)
+            + held(&self.roots)
+    }
+
     pub(super) fn block_count(&self) -> usize {
         self.leaves.len() + self.inner.len()
     }

@@ -68,6 +68,13 @@ impl Bvh {
         })
     }
 
+    /// Memory of the tree and of the boxes of a moving and of a resting query, fitted or not yet \[B\].
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes()
+            + Boxes::<2>::bytes(&self.tree, self.vertex_count)
+            + Boxes::<1>::bytes(&self.tree, self.vertex_count)
+    }
+
     fn check_mesh(&self, mesh: &CollisionMesh) -> Result<(), DetectError> {
         if mesh.triangles.len() == self.triangle_count && mesh.vertex_count == self.vertex_count {
             return Ok(());

@@ -32,6 +32,14 @@ const VERTEX_CHUNK: usize = 4096;
 const BLOCK_CHUNK: usize = 256;
 
 impl<const ENDS: usize> Boxes<ENDS> {
+    /// Memory of the boxes over a tree \[B\].
+    pub(super) fn bytes(tree: &Tree, vertex_count: usize) -> usize {
+        let per_block = size_of::<Block<ENDS>>() + size_of::<MovingBox<ENDS>>() + size_of::<BlockLanes>();
+        vertex_count * size_of::<MovingBox<ENDS>>()
+            + tree.block_count() * per_block
+            + (tree.vertex_ids.len() + tree.edge_ids.len()) * size_of::<Block<ENDS>>()
+    }
+
     /// Fits all boxes to the positions `x` \[m\] at the ends, inflated by `margin` \[m\].
     pub(super) fn refit(
         &mut self,
