@@ -231,7 +231,7 @@ fn absurd_numbers_are_named_with_their_bound() {
         assert!(error.got.contains(&format!("{value:?}")), "{error}");
     };
     check("width = 1.0", "width = 1e300", "cloth[0].mesh.width", "at most 1e9 m");
-    check("height = 1.0", "height = 1e-30", "cloth[0].mesh.height", "at least 1e-9 m");
+    check("height = 1.0", "height = 1e-30", "cloth[0].mesh.height", "at least 1e-7 m");
     check("radius = 0.4", "radius = 1e300", "collider[0].shape.radius", "at most 1e9 m");
     check("tolerance = 0.01", "tolerance = 1e-200", "collider[0].shape.tolerance", "at least 1e-9 m");
     check("thickness = 0.004", "thickness = 1e300", "contact.thickness", "at most 1e6 m");

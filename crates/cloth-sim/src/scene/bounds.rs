@@ -23,14 +23,15 @@ struct Bound {
 
 /// The first row that has a key counts; what is in none is bounded by [`OTHER`].
 #[rustfmt::skip]
-const BOUNDS: [Bound; 17] = [
+const BOUNDS: [Bound; 18] = [
     // A region without end on one side is a way to say "all above".
     Bound { keys: &["box.min", "box.max"], least: 0.0, largest: f64::MAX, unit: " m", why: "" },
     Bound { keys: &["cloth.warp", "axis"], least: 1e-100, largest: 1e100, unit: "", why: "the square of its length is to be a number" },
     Bound {
-        keys: &["width", "height", "length", "radius", "half_height", "half_extents", "half_size", "size", "shape.tolerance"],
-        least: 1e-9, largest: LENGTH, unit: " m", why: "an atom's breadth to the Sun's",
+        keys: &["width", "height", "length", "radius", "half_height", "half_extents", "half_size", "size"],
+        least: 1e-7, largest: LENGTH, unit: " m", why: "a hundredth of a fibre's breadth to the Sun's",
     },
+    Bound { keys: &["shape.tolerance"], least: 1e-9, largest: LENGTH, unit: " m", why: "an atom's breadth to the Sun's" },
     Bound { keys: &["position", "pivot"], least: 0.0, largest: LENGTH, unit: " m", why: "farther away, millimetres are rounded" },
     Bound { keys: &["cloth.velocity"], least: 0.0, largest: VELOCITY, unit: " m/s", why: "faster than all that falls from space" },
     Bound { keys: &["air.wind"], least: 0.0, largest: VELOCITY, unit: " m/s", why: "faster than all that falls from space" },
