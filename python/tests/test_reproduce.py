@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+import signal
+import subprocess
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import cli_command
 
 from clothsim import bending
 from clothsim._cli import main
@@ -242,3 +246,36 @@ def test_checks_can_fail() -> None:
 def test_tables_carry_their_parameters() -> None:
     text = Table(("a [m]", "b"), [(0.1, "x"), (2, "y")]).text({"c1 [N m2]": -0.5, "chosen": "c1"})
     assert text == "# c1 [N m2]: -0.5\n# chosen: c1\na [m],b\n0.1,x\n2,y\n"
+
+
+def test_where_one_simulation_fails_the_others_end() -> None:
+    done: list[int] = []
+
+    def work(item: int) -> int:
+        if item == 1:
+            raise InvalidInput("planted")
+        for _ in range(10_000):
+            time.sleep(0.001)
+            bar.update()
+        done.append(item)
+        return item
+
+    effort = Effort(threads=2)
+    with effort.bar(1, "test") as bar, pytest.raises(InvalidInput, match="planted"):
+        effort.each(work, [0, 1, 2], bar)
+    assert done == []
+
+
+def test_ctrl_c_ends_soon_and_leaves_no_folder(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = subprocess.Popen(cli_command("reproduce", "4.13", "-o", out, "--quiet"), stderr=subprocess.PIPE)
+    deadline = time.monotonic() + 60
+    while not out.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert error.decode() == "clothsim: interrupted\n"
+    assert not out.exists()

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 from clothsim._arrays import optional
 
-__all__ = ["Check", "Effort", "Reproduction", "Table"]
+__all__ = ["Bar", "Check", "Effort", "Reproduction", "Table"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -140,18 +141,55 @@ class Effort:
     threads: int = field(default_factory=_threads)
     progress: bool = False
 
-    def bar(self, total: int, name: str, unit: str = "step") -> Any:
-        """Return a progress bar with an estimate of the time left; close it."""
-        tqdm = optional("tqdm", extra="all", purpose="showing progress")
-        return tqdm.tqdm(total=total, desc=name, unit=unit, disable=not self.progress, dynamic_ncols=True)
+    def bar(self, total: int, name: str, unit: str = "step") -> Bar:
+        """Return a progress bar with an estimate of the time left; use it in a ``with``."""
+        return Bar(total, name, unit, enabled=self.progress)
 
-    def each(self, work: Any, items: Sequence[Item]) -> Iterator[Any]:
-        """Yield ``work(item)`` for each item in its order, on as many threads as there are.
+    def each(self, work: Callable[[Item], Result], items: Sequence[Item], bar: Bar) -> list[Result]:
+        """Do ``work(item)`` for each item on as many threads as there are; return the results in the items' order.
 
-        For simulations, which take one thread each here: they release the interpreter while they step.
+        For simulations, which take one thread each here: they release the interpreter while they step. Where one fails,
+        or Ctrl-C comes, the others end at their next `Bar.update`.
         """
         pool = ThreadPoolExecutor(max_workers=max(1, min(self.threads, len(items))))
         try:
-            yield from pool.map(work, items)
+            futures = [pool.submit(work, item) for item in items]
+            for future in wait(futures, return_when=FIRST_EXCEPTION).done:
+                future.result()
+            return [future.result() for future in futures]
+        except BaseException:
+            bar.stop()
+            raise
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+class Bar:
+    """A progress bar on stderr, which can also stop who updates it."""
+
+    def __init__(self, total: int, name: str, unit: str, *, enabled: bool) -> None:
+        tqdm = optional("tqdm", extra="all", purpose="showing progress")
+        self._bar = tqdm.tqdm(total=total, desc=name, unit=unit, disable=not enabled, dynamic_ncols=True)
+        self._stopped = threading.Event()
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def update(self) -> None:
+        """One more is done.
+
+        Raises
+        ------
+        CancelledError
+            Another thread has failed.
+        """
+        if self._stopped.is_set():
+            raise CancelledError
+        self._bar.update()
+
+    def stop(self) -> None:
+        """Let the next update of any thread raise."""
+        self._stopped.set()

@@ -99,11 +99,9 @@ def measure(effort: Effort) -> Measured:
     """Simulate the four laws."""
     setup = Setup(cells=12, bending_substeps=1) if effort.quick else Setup()
     frames = round(setup.duration * FPS)
-    bar = effort.bar(frames * len(LAWS), "figure 4.11", "frame")
-    try:
-        runs = dict(zip(LAWS, effort.each(lambda law: _run(law, setup, frames, bar.update), LAWS), strict=True))
-    finally:
-        bar.close()
+    with effort.bar(frames * len(LAWS), "figure 4.11", "frame") as bar:
+        found = effort.each(lambda law: _run(law, setup, frames, bar.update), LAWS, bar)
+        runs = dict(zip(LAWS, found, strict=True))
     simulation = Simulation(_scene("linear", setup), threads=1)
     bodies = simulation.bodies
     standing = standing_positions(bodies, simulation.collider_positions)

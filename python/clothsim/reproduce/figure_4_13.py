@@ -51,14 +51,11 @@ def measure(effort: Effort) -> Measured:
     """Clamp and hang one strip per law and number of cycles."""
     setup = Setup(rows=1, hang_time=1.0) if effort.quick else Setup()
     jobs = [(law, n) for law in LAWS for n in (QUICK_CYCLES if effort.quick else CYCLES)]
-    bar = effort.bar(sum(n for _, n in jobs), "figure 4.13", "cycle")
-    try:
+    with effort.bar(sum(n for _, n in jobs), "figure 4.13", "cycle") as bar:
         # The longest first, so that all threads are busy to the end.
         order = sorted(jobs, key=lambda job: -job[1])
-        found = effort.each(lambda job: clamping.clamp(job[0], job[1], setup, hang=True, tick=bar.update), order)
+        found = effort.each(lambda job: clamping.clamp(job[0], job[1], setup, hang=True, tick=bar.update), order, bar)
         done = dict(zip(order, found, strict=True))
-    finally:
-        bar.close()
     return Measured(setup, {law: [done[job] for job in jobs if job[0] == law] for law in LAWS})
 
 

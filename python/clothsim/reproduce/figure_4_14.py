@@ -43,11 +43,8 @@ def measure(effort: Effort) -> Measured:
     """Clamp a strip, and read the history of the hinge on the fold each time the planes are closed again."""
     cycles = QUICK_CYCLES if effort.quick else CYCLES
     setup = Setup(rows=2)
-    bar = effort.bar(cycles + 1, "figure 4.14", "cycle")
-    try:
+    with effort.bar(cycles + 1, "figure 4.14", "cycle") as bar:
         specimen = clamping.clamp("hysteresis", cycles + 1, setup, hang=False, tick=bar.update)
-    finally:
-        bar.close()
     hinge = specimen.apex()
     sign = -math.copysign(1.0, specimen.clamped["rest_curvature"][-1][hinge])
     law = bending.trace(-sign * specimen.path[:, hinge], "hysteresis", **FABRIC.si())

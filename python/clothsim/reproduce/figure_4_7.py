@@ -59,7 +59,7 @@ class Measured:
 
 def measure(effort: Effort) -> Measured:
     """Trace the paths, and read K0, M0 and the loop's area off the curves."""
-    per_unit = 200 if effort.quick else 2000
+    per_unit = 200 if effort.quick else 500
     panels = {
         "b": trace("(b) full loop, λ = 0", LOOP, FABRIC, per_unit),
         "c": trace("(c) partial cycles, λ = 0", TURNS, FABRIC, per_unit),

@@ -69,8 +69,7 @@ def measure(effort: Effort) -> Measured:
     keys = [(law, alpha) for law in LAWS for alpha in ALPHAS]
     simulations = {key: Simulation(_scene(*key, cells), threads=effort.threads) for key in keys}
     reports: dict[tuple[str, int], list[dict[str, Any]]] = {key: [] for key in keys}
-    bar = effort.bar(len(keys) * (SETTLING + rounds * STEPS), "table 4.1")
-    try:
+    with effort.bar(len(keys) * (SETTLING + rounds * STEPS), "table 4.1") as bar:
         for key in keys:
             for _ in range(SETTLING):
                 simulations[key].step()
@@ -80,8 +79,6 @@ def measure(effort: Effort) -> Measured:
                 for _ in range(STEPS):
                     reports[key].append(simulations[key].step())
                     bar.update()
-    finally:
-        bar.close()
     return Measured(
         triangles=2 * cells[0] * cells[1],
         threads=effort.threads,
