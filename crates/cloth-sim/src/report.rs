@@ -138,7 +138,8 @@ pub struct EffectCost {
 const FORCES_WITHIN: &str = "integrator";
 
 /// The effect that a stage of the step is counted under: an effect of the stage's own name, or one of these.
-const STAGES: [(&str, &str); 10] = [
+const STAGES: [(&str, &str); 11] = [
+    ("bending sub-steps", FORCES_WITHIN),
     ("forces", FORCES_WITHIN),
     ("linearise", FORCES_WITHIN),
     ("assemble", FORCES_WITHIN),

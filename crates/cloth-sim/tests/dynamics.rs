@@ -293,3 +293,19 @@ fn a_checkpoint_may_leave_out_the_steps_that_are_kept_elsewhere() {
     let again = Simulation::resume(&resumed.checkpoint(), None).unwrap();
     assert_eq!(again.report(), resumed.report());
 }
+
+#[test]
+fn every_stage_of_every_integrator_is_an_effects_cost() {
+    for integrator in
+        ["explicit-euler", "midpoint", "rk4", "implicit-euler", "implicit-newton", "semi-implicit"]
+    {
+        let mut sim = build(&scene(&hanging(9, integrator, 1e-4)), 1);
+        advance(&mut sim, 2e-3).unwrap();
+        let report = sim.report();
+        let staged: f64 = report.totals.seconds.iter().map(|(_, s)| s).sum();
+        let timed: f64 = report.effects.iter().filter_map(|e| e.milliseconds).sum();
+        assert!((timed - 1e3 * staged).abs() < 1e-6, "{integrator}: {timed} of {staged}: {report:?}");
+        let least = report.effects.iter().filter_map(|e| e.milliseconds).fold(f64::INFINITY, f64::min);
+        assert!(least > 0.0, "{integrator}: {:?}", report.effects);
+    }
+}
