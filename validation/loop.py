@@ -15,7 +15,7 @@ from .strips import strip
 # Slope of the strip below the horizontal where it leaves the grip [rad].
 FORMS = {"ring": 0.0, "heart": -np.pi / 2.0, "pear": np.pi / 2.0}
 # w g L³/B of the whole strip length L.
-LOADS = (1.0, 10.0, 30.0, 100.0, 300.0)
+LOADS = (10.0, 30.0, 100.0, 300.0, 1000.0)
 LENGTH = 0.2  # m
 DENSITY = 0.15  # kg/m²
 GRAVITY = 9.81  # m/s²

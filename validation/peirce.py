@@ -119,7 +119,7 @@ def plot(found: list[tuple[Any, str, Overhang]], path: Path) -> None:
         line = {"equilateral": "-", "union-jack": "--"}[kind]
         label = f"{name}, {kind}"
         shapes.plot(1e3 * overhang.shape[:, 0], 1e3 * overhang.shape[:, 1], line, color=colour, label=label)
-    shapes.set(title="overhangs at rest", xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    shapes.set(title="overhangs at rest", xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 50), ylim=(-44, 2))
     shapes.legend(fontsize=8, loc="lower left")
     gammas = np.geomspace(0.1, 1000.0, 60)
     ratios = [float(np.divide(*elastica.cantilever(float(g)).tip[::-1])) for g in gammas]
