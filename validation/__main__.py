@@ -23,12 +23,16 @@ def main() -> int:
         own = TESTS[name]()
         results += own
         worst = max((r.deviation / r.bound for r in own if r.bound), default=0.0)
-        print(f"{name}: {len(own)} rows in {time.perf_counter() - start:.0f} s; worst claim at {100.0 * worst:.0f} % of its bound")
+        seconds = time.perf_counter() - start
+        print(
+            f"{name}: {len(own)} rows in {seconds:.0f} s; worst claim at {100.0 * worst:.0f} % of its bound", flush=True
+        )
     tables.write_results(results, names)
     outside = [r for r in results if not r.within]
     for r in outside:
         print(f"OUTSIDE ITS BOUND: {r.test}: {r.case}: {r.quantity}: {r.deviation:.3g} > {r.bound:.3g} ({r.measure})")
-    print(f"{tables.RESULTS}: {len(results)} rows, {sum(r.bound is not None for r in results)} claims, {len(outside)} outside")
+    claims = sum(r.bound is not None for r in results)
+    print(f"{tables.RESULTS}: {len(results)} rows, {claims} claims, {len(outside)} outside their bounds")
     return 1 if outside else 0
 
 

@@ -155,7 +155,12 @@ def refinement(rows: list[Row]) -> list[tables.Result]:
     return results
 
 
-MARKS = {"union-jack": ("o", "C0"), "equilateral": ("^", "C2"), "equilateral-along": ("v", "C4"), "one-way": ("s", "C3")}
+MARKS = {
+    "union-jack": ("o", "C0"),
+    "equilateral": ("^", "C2"),
+    "equilateral-along": ("v", "C4"),
+    "one-way": ("s", "C3"),
+}
 
 
 def plot(rows: list[Row], path: Path) -> None:

@@ -127,14 +127,14 @@ def simulate(
     material = cs.Material(density, IN_PLANE, bending)
     scene.add_cloth(cloth.mesh, material, pins=pins, velocities=disturbance(cloth, seed))
     simulation = cs.Simulation(scene, threads=1)
-    for second in range(1, MOST + 1):
+    seconds, speed = 0, np.inf
+    while speed >= REST and seconds < MOST:
         simulation.advance(1.0)
+        seconds += 1
         speed = float(np.linalg.norm(simulation.velocities, axis=1).max())
-        if speed < REST:
-            break
     positions = simulation.positions
     crossing = len(cs.collision.self_intersections(positions, cloth.mesh.triangles))
-    return Drape(coefficient(cloth, positions), nodes(cloth, positions), second, speed, crossing, positions)
+    return Drape(coefficient(cloth, positions), nodes(cloth, positions), seconds, speed, crossing, positions)
 
 
 def laws(rigidity: float, coercive_couple: float) -> dict[str, dict[str, Any]]:
@@ -218,7 +218,9 @@ def plot(drapes: dict[tuple[Any, ...], list[Drape]], fabrics: list[dict[str, str
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(1, len(fabrics) + 1, figsize=(15, 4.2), layout="constrained", width_ratios=[1] * 4 + [1.9])
+    figure, axes = plt.subplots(
+        1, len(fabrics) + 1, figsize=(15, 4.2), layout="constrained", width_ratios=[1] * 4 + [1.9]
+    )
     cloth, chart = disc(), axes[-1]
     for axis, row in zip(axes, fabrics, strict=False):
         drape = drapes[row["case"], "hinge", CUSICK, COARSE][0]
@@ -227,12 +229,15 @@ def plot(drapes: dict[tuple[Any, ...], list[Drape]], fabrics: list[dict[str, str
         turn = np.linspace(0.0, 2.0 * np.pi, 200)
         for radius, line in ((cloth.pedestal, "-"), (cloth.specimen, ":")):
             axis.plot(1e3 * radius * np.cos(turn), 1e3 * radius * np.sin(turn), line, color="k", lw=0.8)
-        axis.set(title=f"{row['case']}\n{drape.coefficient:.0f} %, {drape.nodes} nodes\n(measured {float(row['target']):.0f} %, {row['nodes']})")
+        measured = f"(measured {float(row['target']):.0f} %, {row['nodes']})"
+        axis.set(title=f"{row['case']}\n{drape.coefficient:.0f} %, {drape.nodes} nodes\n{measured}")
         axis.set_aspect("equal")
         axis.axis("off")
     sweep = [[d.coefficient for d in drapes[f"c = {1e3 * c:g} mm", "hinge", CUSICK, COARSE]] for c in SWEEP]
     lengths = 1e3 * np.array(SWEEP)
-    chart.fill_between(lengths, [min(v) for v in sweep], [max(v) for v in sweep], color="0.85", label="hinge law, spread of seeds")
+    chart.fill_between(
+        lengths, [min(v) for v in sweep], [max(v) for v in sweep], color="0.85", label="hinge law, spread of seeds"
+    )
     chart.plot(lengths, [np.mean(v) for v in sweep], color="0.4", label="hinge law, mean")
     for n, row in enumerate(fabrics):
         length = 1e3 * bending_length(float(row["density"]), float(row["rigidity"]))
@@ -242,8 +247,15 @@ def plot(drapes: dict[tuple[Any, ...], list[Drape]], fabrics: list[dict[str, str
             label = f"ours, {law}" if n == 0 else None
             chart.errorbar(length, np.mean(values), span, fmt=mark, color="C0", mfc=face, capsize=3, label=label)
         chart.plot(length, float(row["target"]), "*", color="C3", ms=11, label="measured" if n == 0 else None)
-        chart.annotate(row["case"], (length, float(row["target"])), xytext=(6, -10), textcoords="offset points", fontsize=8)
-    chart.set(title="drape coefficient, 30 cm on 18 cm", xlabel="bending length (B/(w g))^⅓ [mm]", ylabel="drape coefficient [%]", ylim=(15, 100))
+        chart.annotate(
+            row["case"], (length, float(row["target"])), xytext=(6, -10), textcoords="offset points", fontsize=8
+        )
+    chart.set(
+        title="drape coefficient, 30 cm on 18 cm",
+        xlabel="bending length (B/(w g))^⅓ [mm]",
+        ylabel="drape coefficient [%]",
+        ylim=(15, 100),
+    )
     chart.legend(fontsize=8, loc="lower right")
     figure.savefig(path, dpi=90)
     plt.close(figure)

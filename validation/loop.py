@@ -102,9 +102,7 @@ def run() -> list[tables.Result]:
         rows.append((form, load, found.height, target, length, textbook))
         case = f"{form}, w g L^3/B {load:g}"
         error = 100.0 * abs(found.height / target - 1.0)
-        results.append(
-            tables.Result("loop", case, "height/L", "-", found.height, target, error, "relative", BOUND)
-        )
+        results.append(tables.Result("loop", case, "height/L", "-", found.height, target, error, "relative", BOUND))
         if textbook is not None:
             error = 100.0 * abs(textbook / length - 1.0)
             note = "what the formula makes of our height: the formula is an approximation"
@@ -112,7 +110,9 @@ def run() -> list[tables.Result]:
                 tables.Result("loop", case, "c/L by Peirce 1930", "-", textbook, length, error, "relative", None, note)
             )
     tables.write(
-        tables.FOLDER / "loop.csv", ("form", "load", "height", "elastica", "bending_length", "peirce_bending_length"), rows
+        tables.FOLDER / "loop.csv",
+        ("form", "load", "height", "elastica", "bending_length", "peirce_bending_length"),
+        rows,
     )
     plot(jobs, loops, tables.FOLDER / "loop.png")
     return results

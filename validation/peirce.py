@@ -97,7 +97,7 @@ def run() -> list[tables.Result]:
                     f"overhang {1e3 * overhang.length:.2f} mm; the mesh's rigidity at small deflections {factor:.4f} B",
                 )
             )
-    columns = "mesh,fabric,density,rigidity,overhang,angle_degrees,mesh_rigidity,recovered_elastica,recovered_half,recovered_peirce"
+    columns = "mesh,fabric,density,rigidity,overhang,angle_degrees,mesh_rigidity,by_elastica,by_half,by_peirce"
     tables.write(tables.FOLDER / "peirce.csv", columns.split(","), rows)
     plot(list(zip(jobs, names, found, strict=True)), tables.FOLDER / "peirce.png")
     return results
@@ -119,17 +119,23 @@ def plot(found: list[tuple[Any, str, Overhang]], path: Path) -> None:
         line = {"equilateral": "-", "union-jack": "--"}[kind]
         label = f"{name}, {kind}"
         shapes.plot(1e3 * overhang.shape[:, 0], 1e3 * overhang.shape[:, 1], line, color=colour, label=label)
-    shapes.set(title="overhangs at rest", xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 50), ylim=(-44, 2))
+    shapes.set(
+        title="overhangs at rest", xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-2, 50), ylim=(-44, 2)
+    )
     shapes.legend(fontsize=8, loc="lower left")
     gammas = np.geomspace(0.1, 1000.0, 60)
     ratios = [float(np.divide(*elastica.cantilever(float(g)).tip[::-1])) for g in gammas]
     degrees = np.degrees(np.arctan(ratios))
     error = [100.0 * (elastica.peirce_factor(float(a)) ** 3 * g - 1.0) for a, g in zip(degrees, gammas, strict=True)]
     formula.plot(degrees, error, label="Peirce's f(θ)")
-    formula.plot(elastica.PEIRCE_ANGLE, 100.0 * (0.125 * elastica.gamma_of_slope(np.tan(slope)) - 1.0), "ko", label="c = l/2")
+    formula.plot(
+        elastica.PEIRCE_ANGLE, 100.0 * (0.125 * elastica.gamma_of_slope(np.tan(slope)) - 1.0), "ko", label="c = l/2"
+    )
     formula.axhline(0.0, color="0.6", lw=1)
     formula.axvline(elastica.PEIRCE_ANGLE, color="0.6", ls=":")
-    formula.set(title="formula against the elastica", xlabel="angle of the chord [°]", ylabel="error of B [%]", ylim=(-5, 65))
+    formula.set(
+        title="formula against the elastica", xlabel="angle of the chord [°]", ylabel="error of B [%]", ylim=(-5, 65)
+    )
     formula.legend(fontsize=8)
     figure.savefig(path, dpi=90)
     plt.close(figure)

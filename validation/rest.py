@@ -44,7 +44,12 @@ def settle(simulation: cs.Simulation, length: float, seconds: float = 1.0) -> Re
 def stepping(seconds: float = 1.0) -> dict[str, dict[str, object]]:
     """Tables of a scene for `settle`: Newton's method, a direct solver, and a little air."""
     return {
-        "time": {"dt": seconds, "integrator": "implicit-newton", "newton_tolerance": 1e-8, "newton_max_iterations": 200},
+        "time": {
+            "dt": seconds,
+            "integrator": "implicit-newton",
+            "newton_tolerance": 1e-8,
+            "newton_max_iterations": 200,
+        },
         "solver": {"method": "faer-llt"},
         "air": {"damping": 1.0},
     }

@@ -51,9 +51,7 @@ def strip(kind: str, length: float, cells: int, across: int) -> Strip:
     vertices = np.column_stack([x, np.zeros_like(x), z])
     rounding = 1e-9 * length
     last = start + cell + rounding
-    return Strip(
-        cs.Mesh(vertices, triangles), np.flatnonzero(x <= last), np.flatnonzero(x >= length - rounding), cell
-    )
+    return Strip(cs.Mesh(vertices, triangles), np.flatnonzero(x <= last), np.flatnonzero(x >= length - rounding), cell)
 
 
 def _squares(nx: int, nz: int, alternate: bool) -> tuple[list[tuple[float, float]], list[list[int]]]:
@@ -78,9 +76,7 @@ def _edges_along(nx: int, nz: int) -> tuple[list[tuple[float, float]], list[list
     return _staggered(nz, nx, 1.0, np.sqrt(3.0) / 2.0)
 
 
-def _staggered(
-    rows: int, columns: int, edge: float, apart: float
-) -> tuple[list[tuple[float, float]], list[list[int]]]:
+def _staggered(rows: int, columns: int, edge: float, apart: float) -> tuple[list[tuple[float, float]], list[list[int]]]:
     """Equilateral triangles over ``rows`` bands of ``columns`` edges along x, with straight ends."""
     points: list[tuple[float, float]] = []
     lines = []

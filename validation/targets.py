@@ -9,27 +9,41 @@ import numpy as np
 
 from . import cantilever, elastica, loop, tables
 
-NAMES = ("test", "case", "quantity", "unit", "target", "kind", "density", "rigidity", "coercive_couple", "nodes", "source", "note")
+NAMES = (
+    "test",
+    "case",
+    "quantity",
+    "unit",
+    "target",
+    "kind",
+    "density",
+    "rigidity",
+    "coercive_couple",
+    "nodes",
+    "source",
+    "note",
+)
 UNKNOWN = (None,) * 4
 
 ELASTICA = (
-    "heavy elastica, theta'' = -Gamma (1 - s) cos theta, theta(0) = theta'(1) = 0, solved in validation/elastica.py to 1e-8; "
-    "W. G. Bickley 1934, The heavy elastica, Philosophical Magazine 17, 603-622"
+    "heavy elastica, theta'' = -Gamma (1 - s) cos theta, theta(0) = theta'(1) = 0, solved in validation/elastica.py to "
+    "1e-8; W. G. Bickley 1934, The heavy elastica, Philosophical Magazine 17, 603-622"
 )
 LOOP = (
-    "planar heavy elastica with both ends in one grip, solved in validation/elastica.py to 1e-8; the tests: F. T. Peirce 1930; "
-    "R. H. Plaut 2015, Formulas to determine fabric bending rigidity from simple tests, Textile Research Journal 85, "
-    "doi:10.1177/0040517514553877"
+    "planar heavy elastica with both ends in one grip, solved in validation/elastica.py to 1e-8; the tests: "
+    "F. T. Peirce 1930; R. H. Plaut 2015, Textile Research Journal, doi:10.1177/0040517514553877"
 )
-PEIRCE = "F. T. Peirce 1930, The 'handle' of cloth as a measurable quantity, Journal of the Textile Institute 21, T377-T416"
+PEIRCE = (
+    "F. T. Peirce 1930, The 'handle' of cloth as a measurable quantity, Journal of the Textile Institute 21, T377-T416"
+)
 REPEATED = "an approximation, as textbooks repeat it; the paper itself was not at hand"
 MATSUDAIRA = (
-    "M. Matsudaira, T. Masuda, M. Wada, H. Yokura 2015, Shape Factor of Flared Skirts Compared with That of Circular Fabrics, "
-    "Journal of Textile Engineering 61(6) 69-73, doi:10.4188/jte.61.69, tables 1 (KES: B, 2HB, W) and 2 (drape coefficient)"
+    "M. Matsudaira, T. Masuda, M. Wada, H. Yokura 2015, Shape Factor of Flared Skirts Compared with That of "
+    "Circular Fabrics, Journal of Textile Engineering 61(6) 69-73, doi:10.4188/jte.61.69, tables 1 (KES) and 2 (drape)"
 )
 SECOND_HAND = (
-    "second-hand: from the transcription in github.com/antonbj3/3fold-motion-engine, commit 72e280ae; it does not state the "
-    "diameters of specimen and pedestal"
+    "second-hand: from the transcription in github.com/antonbj3/3fold-motion-engine, commit 72e280ae; it does not "
+    "state the diameters of specimen and pedestal, nor the shear stiffness"
 )
 # KES units of the source in SI: gf cm²/cm in N m, gf cm/cm in N m/m, mg/cm² in kg/m².
 GF_CM2, GF_CM, MG_CM2 = 9.80665e-5, 9.80665e-3, 1e-2
@@ -52,7 +66,17 @@ def rows() -> list[tuple[object, ...]]:
     exact = elastica.gamma_of_slope(float(np.tan(np.radians(elastica.PEIRCE_ANGLE))))
     overhang = "overhang at 41.5 degrees"
     out.append(
-        ("peirce", overhang, "w g l^3/B", "-", exact, solved, *UNKNOWN, ELASTICA, "c = l/2, as ASTM D1388 has it, means 8")
+        (
+            "peirce",
+            overhang,
+            "w g l^3/B",
+            "-",
+            exact,
+            solved,
+            *UNKNOWN,
+            ELASTICA,
+            "c = l/2, as ASTM D1388 has it, means 8",
+        )
     )
     factor = elastica.peirce_factor(elastica.PEIRCE_ANGLE)
     text = f"{PEIRCE}: c = l (cos(theta/2)/(8 tan theta))^(1/3)"
