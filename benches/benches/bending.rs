@@ -8,6 +8,7 @@
 
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(clippy::unwrap_used, reason = "a bench that cannot start has nothing to measure")]
+#![allow(clippy::print_stdout, reason = "a bench prints what it measures")]
 
 use std::{sync::Arc, time::Instant};
 

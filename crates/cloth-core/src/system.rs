@@ -6,10 +6,12 @@ use rayon::prelude::*;
 
 use crate::{
     Bending, CoreError, EffectInfo, Energy, Environment, InPlane, Material,
-    assembly::{Corners, ELEMENTS_PER_CHUNK, ForceClock, ROWS_PER_CHUNK, part, parts_mut, timed},
-    bending::{BendingLaw, HingeState, Linear},
+    assembly::{
+        Corners, ELEMENTS_PER_CHUNK, ElementBuffers, ForceClock, ROWS_PER_CHUNK, part, parts_mut, timed,
+    },
+    bending::{self, BendingLaw, HingeState},
     forces::{
-        ForceModel,
+        ForceModel, Linear,
         air::Air,
         hinge::{Hinges, Rest, dihedral_angle},
         spring::{Role, Springs},
@@ -230,9 +232,18 @@ impl ClothSystem {
         }
     }
 
-    /// Models, their memory to be moved on, and whether an accepted motion waits for that, which is then taken as done.
-    pub(crate) fn models_to_settle(&mut self) -> (&[Box<dyn ForceModel>], &mut [Vec<f64>], bool) {
-        (&self.models, &mut self.memory, std::mem::take(&mut self.moved))
+    /// Corner forces and couplings of all models at (x, v). If an accepted motion waits, it is the one to `x`, and laws with
+    /// memory move on in the same pass. Call on the pool.
+    pub(crate) fn linearise(
+        &mut self,
+        elements: &mut ElementBuffers,
+        corners: &mut Corners,
+        x: &[Vec3],
+        v: &[Vec3],
+        linear: Linear,
+    ) {
+        let linear = Linear { accept: std::mem::take(&mut self.moved), ..linear };
+        elements.linearise(&self.models, &mut self.memory, corners, x, v, &linear);
     }
 
     /// Number of cloth vertices.
@@ -496,7 +507,7 @@ impl ClothPart<'_> {
                 models.push(Box::new(Springs::new(Role::Bending, stiffness, damping, vertices, lengths)?));
             }
             Bending::Hinge { rigidity, damping } => {
-                models.push(self.hinges(Linear::new(rigidity)?, damping * rigidity, rest)?);
+                models.push(self.hinges(bending::Linear::new(rigidity)?, damping * rigidity, rest)?);
             }
             Bending::Nonlinear(given) => {
                 let law = given.curve()?;

@@ -1,5 +1,7 @@
 //! Bending laws alone, against a literal reading of chapter 4 and against closed forms.
 
+#![allow(clippy::unwrap_used, reason = "a failure fails the test")]
+
 use cloth_core::CoreError;
 use cloth_core::bending::{Curve, Hysteresis, Law, Linear, Plastic, Trace, trace};
 

@@ -417,12 +417,12 @@ pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = 
         for _ in 0..5 {
             retried.step().unwrap();
         }
-        let retries: u32 = retried.report.steps.iter().map(|s| s.retries as u32).sum();
+        let retries: u32 = retried.report.steps.iter().map(|s| s.retries).sum();
         assert!(retries >= 2, "{retries}");
         let mut straight = remembering();
         for step in &retried.report.steps {
             // The sizes that were accepted, one after the other.
-            let (start, substeps) = (straight.time(), step.substeps as u32);
+            let (start, substeps) = (straight.time(), step.substeps);
             for k in 1..=substeps {
                 let end = if k == substeps {
                     step.time

@@ -8,8 +8,8 @@
 //!   m(K) = σ M_0 − (σ M_0 − m_p) ((d − K)/(d − K_p))²   up to d,   then   m = σ M_0, z = K − σ K_0.
 //!
 //! That is (4.2) from the origin, (4.5) from one side to the other, and (4.8) from anywhere. Any point of a parabola
-//! leads to the same corner on the same parabola, so a place needs to remember its last point only: no list of
-//! reversals.
+//! leads to the same corner on the same parabola, so a place remembers how bowed its parabola is and no list of
+//! reversals: m(K) = σ (M_0 − β |c_1| (d − K)²) with β = 1 on the first loading, 1/2 from side to side.
 //!
 //! Stored energy, per area: Ψ = ½ b_2 K² + ½ M_0 K_0 (u² + (m/M_0 − u)²) with u = (K − z)/K_0. Along a parabola
 //! M K̇ − Ψ̇ = 2 M_0 (m/M_0 − u)² |K̇|/(1 − σ u) ≥ 0 and along a side M_0 |K̇|: the law never gives more than it took.
@@ -22,6 +22,8 @@
 //! complete recovery leave an unused place about the new rest curvature. Where friction shrinks below |m|, m goes with it.
 //!
 //! Source: thesis 4.3.2–4.3.5.
+
+#![allow(clippy::inline_always, reason = "measured: a call per hinge costs a third of the kernel")]
 
 use bytemuck::{Pod, Zeroable};
 
@@ -51,8 +53,8 @@ pub struct Loop {
     window: f64,
     /// K: curvature from the rest curvature [1/m].
     curvature: f64,
-    /// m: friction moment [N].
-    friction: f64,
+    /// β with the sign of the direction σ: the parabola it moved along last.
+    bow: f64,
     /// M_m: moment at which the recovery under way began, if it may leave a trace; else 0 [N].
     peak: f64,
 }
@@ -60,36 +62,33 @@ pub struct Loop {
 impl Default for Loop {
     /// An unused place, flat.
     fn default() -> Self {
-        Self { rest: 0.0, left: 1.0, window: 0.0, curvature: 0.0, friction: 0.0, peak: 0.0 }
+        Self { rest: 0.0, left: 1.0, window: 0.0, curvature: 0.0, bow: 1.0, peak: 0.0 }
     }
 }
 
-/// The straight side or parabola that a motion follows from a place.
+/// The parabola, and the side after it, that a motion follows from a place.
 struct Branch {
     /// Direction of motion: +1 or −1.
     sigma: f64,
     /// M_0 [N].
     m0: f64,
-    /// M_0 − σ m: friction still to come [N].
-    lacking: f64,
-    /// σ (d − K): way to the corner, ≤ 0 on a side [1/m].
-    span: f64,
-    /// K where it starts [1/m].
-    start: f64,
+    /// β |c_1| [N m²].
+    bow: f64,
+    /// Curvature of the corner d [1/m].
+    corner: f64,
 }
 
 impl Branch {
-    /// Part of the way to the corner that is left at K: 1 at the start, 0 from the corner on.
-    #[inline]
-    fn remaining(&self, curvature: f64) -> f64 {
-        let left = self.span - self.sigma * (curvature - self.start);
-        if left > 0.0 { left / self.span } else { 0.0 }
+    /// Way to the corner; 0 from there on [1/m].
+    #[inline(always)]
+    fn way(&self, curvature: f64) -> f64 {
+        (self.sigma * (self.corner - curvature)).max(0.0)
     }
 
-    /// m.
-    #[inline]
-    fn friction(&self, remaining: f64) -> f64 {
-        self.sigma * (self.m0 - self.lacking * remaining * remaining)
+    /// m at a way from the corner.
+    #[inline(always)]
+    fn friction(&self, way: f64) -> f64 {
+        self.sigma * (self.m0 - self.bow * way * way)
     }
 }
 
@@ -105,7 +104,9 @@ impl Hysteresis {
                 return Err(CoreError::Parameter { name, expected: "a share in [0, 1]", got });
             }
         }
-        Ok(Self { curve, k0: curve.k0(), m0: curve.m0(), plasticity, fatigue })
+        // So written that M is exactly zero at the origin.
+        let m0 = -curve.c1() * (curve.k0() * curve.k0());
+        Ok(Self { curve, k0: curve.k0(), m0, plasticity, fatigue })
     }
 
     /// The curve of first loading of an unused place.
@@ -119,31 +120,74 @@ impl Hysteresis {
     }
 
     /// Frictional moment M_0 that fatigue has left at a place [N].
+    #[inline(always)]
     fn frictional_moment(&self, place: &Loop) -> f64 {
         place.left * place.left * self.m0
     }
 
     /// Moment per width at a place [N].
+    #[inline(always)]
     fn moment_at(&self, place: &Loop) -> f64 {
-        self.curve.b2() * place.curvature + place.friction
+        self.curve.b2() * place.curvature + self.friction(place)
     }
 
-    #[inline]
-    fn branch(&self, place: &Loop, sigma: f64) -> Branch {
-        let m0 = self.frictional_moment(place);
+    /// K_0 that fatigue has left at a place [1/m].
+    #[inline(always)]
+    fn transition(&self, place: &Loop) -> f64 {
+        place.left * self.k0
+    }
+
+    /// The branch that a place moved along last.
+    #[inline(always)]
+    fn last_branch(&self, place: &Loop) -> Branch {
+        let sigma = 1f64.copysign(place.bow);
         Branch {
             sigma,
-            m0,
-            lacking: m0 - sigma * place.friction,
-            span: place.left * self.k0 - sigma * (place.curvature - place.window),
-            start: place.curvature,
+            m0: self.frictional_moment(place),
+            bow: place.bow.abs() * -self.curve.c1(),
+            corner: place.window + sigma * self.transition(place),
         }
     }
 
+    /// Friction moment m at a place [N].
+    #[inline(always)]
+    fn friction(&self, place: &Loop) -> f64 {
+        let branch = self.last_branch(place);
+        branch.friction(branch.way(place.curvature))
+    }
+
+    /// The branch that leaves a place in direction `sigma`.
+    #[inline(always)]
+    fn branch(&self, place: &Loop, sigma: f64) -> Branch {
+        let last = self.last_branch(place);
+        if sigma == last.sigma {
+            return last;
+        }
+        let friction = last.friction(last.way(place.curvature));
+        self.parabola(place, sigma, friction)
+    }
+
+    /// The branch in direction `sigma` through a place where the friction moment is `friction`.
+    #[inline(always)]
+    fn parabola(&self, place: &Loop, sigma: f64, friction: f64) -> Branch {
+        let m0 = self.frictional_moment(place);
+        let corner = place.window + sigma * self.transition(place);
+        let way = sigma * (corner - place.curvature);
+        let bow = if way > 0.0 { (m0 - sigma * friction) / (way * way) } else { 0.0 };
+        Branch { sigma, m0, bow, corner }
+    }
+
+    /// `bow` of a place that moves along a branch.
+    #[inline(always)]
+    fn bow(&self, branch: &Branch) -> f64 {
+        let scale = -self.curve.c1();
+        (if scale > 0.0 { branch.bow / scale } else { 0.0 }).copysign(branch.sigma)
+    }
+
     /// Ψ [J/m²].
-    #[inline]
+    #[inline(always)]
     fn stored(&self, place: &Loop, curvature: f64, window: f64, friction: f64) -> f64 {
-        let (k0, m0) = (place.left * self.k0, self.frictional_moment(place));
+        let (k0, m0) = (self.transition(place), self.frictional_moment(place));
         let elastic = 0.5 * self.curve.b2() * curvature * curvature;
         if m0 == 0.0 {
             return elastic;
@@ -154,57 +198,87 @@ impl Hysteresis {
     }
 
     /// Moves a place monotonically, without the end of a cycle in between. Returns the work per area [J/m²].
+    #[inline(always)]
     fn follow(&self, place: &mut Loop, sigma: f64, curvature: f64) -> f64 {
-        let branch = self.branch(place, sigma);
-        let q = branch.remaining(curvature);
-        let (from, b2) = (place.curvature, self.curve.b2());
-        let work = 0.5 * b2 * (curvature - from) * (curvature + from)
-            + sigma * branch.m0 * (curvature - from)
-            - branch.lacking * branch.span.max(0.0) / 3.0 * (1.0 - q * q * q);
-        place.friction = branch.friction(q);
-        place.curvature = curvature;
-        if q == 0.0 {
-            place.window = curvature - sigma * place.left * self.k0;
+        if sigma != 1f64.copysign(place.bow) {
+            place.bow = self.bow(&self.branch(place, sigma));
         }
-        work
+        let branch = self.last_branch(place);
+        let (from, b2) = (place.curvature, self.curve.b2());
+        let (start, end) = (branch.way(from), branch.way(curvature));
+        place.curvature = curvature;
+        if end == 0.0 {
+            place.window = curvature - sigma * self.transition(place);
+        }
+        0.5 * b2 * (curvature - from) * (curvature + from) + sigma * branch.m0 * (curvature - from)
+            - branch.bow / 3.0 * (start * start * start - end * end * end)
+    }
+
+    /// Whether a motion in direction `sigma` is the start of a recovery that may leave a trace.
+    #[inline(always)]
+    fn begins_recovery(&self, place: &Loop, sigma: f64) -> bool {
+        let last = self.last_branch(place);
+        // On the side it came along, where |M| > M_a is |K| > K_0.
+        sigma != last.sigma
+            && last.m0 > 0.0
+            && last.friction(last.way(place.curvature)) == last.sigma * last.m0
+            && last.sigma * place.curvature > self.transition(place)
+    }
+
+    /// The place as the end of its cycle leaves it, about to move in direction `sigma`.
+    #[cold]
+    fn ended(&self, mut place: Loop, sigma: f64) -> Loop {
+        let friction = self.friction(&place);
+        self.end_cycle(&mut place, sigma, friction);
+        place
+    }
+
+    /// The place where its recovery in direction `sigma` meets M = 0 and its cycle ends, and the work per area on the way
+    /// there [J/m²].
+    #[cold]
+    fn recovered(&self, mut place: Loop, sigma: f64) -> (Loop, f64) {
+        let unloaded = self.unloaded(&place, sigma);
+        let work = self.follow(&mut place, sigma, unloaded);
+        self.end_cycle(&mut place, sigma, -self.curve.b2() * unloaded);
+        (place, work)
     }
 
     /// Curvature from the rest curvature at which a recovery in direction `sigma` meets M = 0 [1/m].
     fn unloaded(&self, place: &Loop, sigma: f64) -> f64 {
-        let branch = self.branch(place, sigma);
-        let (b2, span) = (self.curve.b2(), branch.span.max(0.0));
-        // σ M at the corner: with q of the way left, lacking q² + b_2 span q = corner.
-        let corner = sigma * b2 * branch.start + b2 * span + branch.m0;
-        if corner <= 0.0 || span == 0.0 {
+        let (branch, b2) = (self.branch(place, sigma), self.curve.b2());
+        // σ M at the corner, from which it falls by b_2 w + bow w² over the way w.
+        let corner = sigma * b2 * branch.corner + branch.m0;
+        if corner <= 0.0 {
             return -sigma * branch.m0 / b2;
         }
-        let slope = b2 * span;
-        let q = 2.0 * corner / (slope + (slope * slope + 4.0 * branch.lacking * corner).sqrt());
-        branch.start + sigma * span * (1.0 - q)
+        branch.corner - sigma * 2.0 * corner / (b2 + (b2 * b2 + 4.0 * branch.bow * corner).sqrt())
     }
 
-    /// The end of a cycle that began its recovery at `place.peak`: (4.6), (4.7), (4.11), (4.12).
-    fn end_cycle(&self, place: &mut Loop) {
+    /// The end of a cycle that began its recovery at `place.peak`: (4.6), (4.7), (4.11), (4.12). `friction` is m there,
+    /// `sigma` the direction of the motion that follows.
+    fn end_cycle(&self, place: &mut Loop, sigma: f64, friction: f64) {
         let (b1, b2, c1) = (self.b1(place), self.curve.b2(), -self.curve.c1());
-        let (k0, m0) = (place.left * self.k0, self.frictional_moment(place));
+        let (k0, m0) = (self.transition(place), self.frictional_moment(place));
         let full = 2.0 * (m0 + b2 * k0);
         let (peak, side) = (place.peak.abs(), place.peak.signum());
         place.peak = 0.0;
-        let share = ((peak - side * self.moment_at(place)) / full).min(1.0);
+        let moment = b2 * place.curvature + friction;
+        let share = ((peak - side * moment) / full).min(1.0);
         let unloaded = if peak <= full {
             (peak - m0) / b2 - (b1 - (b1 * b1 - 2.0 * c1 * peak).max(0.0).sqrt()) / c1
         } else {
             m0 / b2
         };
-        let (u, relative) = ((place.curvature - place.window) / k0, place.friction / m0);
+        let (u, relative) = ((place.curvature - place.window) / k0, friction / m0);
         let moved = side * share * self.plasticity * unloaded;
         place.rest += moved;
         place.curvature -= moved;
         place.left *= (1.0 - self.fatigue * share).sqrt();
         let m0 = self.frictional_moment(place);
-        place.friction = (place.friction + b2 * moved).clamp(-m0, m0);
-        let moved = if m0 > 0.0 { place.friction / m0 - relative } else { -u };
-        place.window = place.curvature - (u + moved).clamp(-1.0, 1.0) * place.left * self.k0;
+        let held = (friction + b2 * moved).clamp(-m0, m0);
+        let moved = if m0 > 0.0 { held / m0 - relative } else { -u };
+        place.window = place.curvature - (u + moved).clamp(-1.0, 1.0) * self.transition(place);
+        place.bow = self.bow(&self.parabola(place, sigma, held));
     }
 }
 
@@ -213,47 +287,47 @@ impl BendingLaw for Hysteresis {
     const CONSERVATIVE: bool = false;
     type Memory = Loop;
 
-    #[inline]
+    #[inline(always)]
     fn moment(&self, place: &Loop, curvature: f64, rate: f64) -> Moment {
         let (curvature, b2) = (curvature - place.rest, self.curve.b2());
         let moved = curvature - place.curvature;
         let sigma = 1f64.copysign(if moved == 0.0 { rate } else { moved });
         let branch = self.branch(place, sigma);
-        let q = branch.remaining(curvature);
-        let friction = branch.friction(q);
-        let (window, slope) = if q > 0.0 {
-            (place.window, b2 + 2.0 * branch.lacking * q / branch.span)
-        } else {
-            (curvature - sigma * place.left * self.k0, b2)
-        };
-        let energy = self.stored(place, curvature, window, friction);
-        Moment { moment: b2 * curvature + friction, slope, energy }
+        let way = branch.way(curvature);
+        let friction = branch.friction(way);
+        let window = if way > 0.0 { place.window } else { curvature - sigma * self.transition(place) };
+        Moment {
+            moment: b2 * curvature + friction,
+            slope: b2 + 2.0 * branch.bow * way,
+            energy: self.stored(place, curvature, window, friction),
+        }
     }
 
+    #[inline(always)]
     fn advance(&self, place: &mut Loop, curvature: f64) -> f64 {
         let moved = curvature - place.rest - place.curvature;
         if moved == 0.0 || moved.is_nan() {
             return 0.0;
         }
-        let (sigma, b2) = (moved.signum(), self.curve.b2());
-        let mut work = 0.0;
-        if sigma * self.moment_at(place) < 0.0 {
-            let m0 = self.frictional_moment(place);
-            let overcome =
-                m0 > 0.0 && place.friction == -sigma * m0 && -sigma * place.curvature > place.left * self.k0;
-            if place.peak == 0.0 && overcome {
-                place.peak = self.moment_at(place);
+        let sigma = 1f64.copysign(moved);
+        // Copies that rare cases replace as a whole: in all others they stay in registers.
+        let mut start = *place;
+        if start.peak == 0.0 {
+            if self.begins_recovery(&start, sigma) {
+                start.peak = self.moment_at(&start);
             }
-            let unloaded = if place.peak == 0.0 { f64::NAN } else { self.unloaded(place, sigma) };
-            if sigma * (curvature - place.rest - unloaded) >= 0.0 {
-                work += self.follow(place, sigma, unloaded);
-                place.friction = -b2 * unloaded;
-                self.end_cycle(place);
-            }
-        } else if place.peak != 0.0 {
-            self.end_cycle(place);
+        } else if sigma * self.moment_at(&start) >= 0.0 {
+            start = self.ended(start, sigma);
         }
-        work + self.follow(place, sigma, curvature - place.rest)
+        let mut end = start;
+        let mut work = self.follow(&mut end, sigma, curvature - start.rest);
+        if start.peak != 0.0 && sigma * self.moment_at(&end) >= 0.0 {
+            (end, work) = self.recovered(start, sigma);
+            let rest = end.rest;
+            work += self.follow(&mut end, sigma, curvature - rest);
+        }
+        *place = end;
+        work
     }
 
     fn place(&self, place: &Loop) -> Place {

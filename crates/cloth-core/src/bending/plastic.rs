@@ -86,6 +86,7 @@ impl BendingLaw for Plastic {
         Moment { moment: self.rigidity * elastic, slope, energy: self.stored(elastic, plastic) }
     }
 
+    #[inline]
     fn advance(&self, place: &mut Flow, curvature: f64) -> f64 {
         let flow = self.flow(place, curvature);
         let before = self.stored(place.curvature - place.plastic, place.plastic);

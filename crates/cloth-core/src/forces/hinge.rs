@@ -21,6 +21,8 @@
 //!
 //! Sources: thesis (3.9), (3.28), (3.29) with atan2 and mesh-independent weights; Pabst et al. 2008 for K.
 
+#![allow(clippy::inline_always, reason = "measured: a call per hinge costs a third of the kernel")]
+
 use std::{f64::consts::PI, ops::Range};
 
 use super::{CouplingKind, Couplings, ForceModel, Psd, corner_pairs};
@@ -118,7 +120,7 @@ impl<L: BendingLaw> Hinges<L> {
     }
 
     /// Change of curvature of a hinge whose angle is `angle` ∈ [−π, π].
-    #[inline]
+    #[inline(always)]
     fn curvature(rest: &Rest, memory: &L::Memory, angle: f64) -> f64 {
         let curvature = (angle - rest.angle) / rest.height;
         match L::last(memory) {
@@ -135,7 +137,7 @@ impl<L: BendingLaw> Hinges<L> {
         self.vertices[element].map(|i| x[i as usize])
     }
 
-    #[inline]
+    #[inline(always)]
     fn angle(rest: &Rest, x: &[Vec3; 4]) -> Angle {
         let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
         let (n0, n1) = (e.cross(&l0), l1.cross(&e));
@@ -152,17 +154,17 @@ impl<L: BendingLaw> Hinges<L> {
     }
 
     /// Moment and slope at the angle `value`, of the element `k` of a range that turns at `rate` [rad/s].
-    #[inline]
+    #[inline(always)]
     fn answer(
         &self,
         rest: &Rest,
+        mut place: L::Memory,
         memory: &mut [f64],
         k: usize,
         value: f64,
         rate: f64,
         accept: bool,
     ) -> Moment {
-        let mut place = read::<L>(memory, k);
         let curvature = Self::curvature(rest, &place, value);
         if accept {
             self.law.advance(&mut place, curvature);
@@ -302,14 +304,14 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
             Couplings::Outer(outer) => {
                 for (((k, element), f), outer) in range.enumerate().zip(forces.chunks_exact_mut(4)).zip(outer)
                 {
-                    let rest = &self.rest[element];
+                    let (rest, place) = (&self.rest[element], read::<L>(memory, k));
                     let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
                     let [v0, v1, v2, v3] = self.corners_of(element, v);
                     // Σ g_a = 0, so the rate needs differences only.
                     let rate = gradient[1].dot(&(v1 - v0))
                         + gradient[2].dot(&(v2 - v0))
                         + gradient[3].dot(&(v3 - v0));
-                    let answer = self.answer(rest, memory, k, value, rate, linear.accept);
+                    let answer = self.answer(rest, place, memory, k, value, rate, linear.accept);
                     let per_angle = rest.edge / rest.height;
                     // A negative slope has no place in a positive semi-definite block.
                     let stiffness = per_angle * answer.slope.max(0.0);
@@ -326,12 +328,12 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                 for (((k, element), f), blocks) in
                     range.enumerate().zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
                 {
-                    let rest = &self.rest[element];
+                    let (rest, place) = (&self.rest[element], read::<L>(memory, k));
                     let corners = self.corners_of(element, x);
                     let velocity = self.corners_of(element, v);
                     let Angle { value, gradient } = Self::angle(rest, &corners);
                     let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
-                    let answer = self.answer(rest, memory, k, value, rate, linear.accept);
+                    let answer = self.answer(rest, place, memory, k, value, rate, linear.accept);
                     let per_angle = rest.edge / rest.height;
                     let (stiffness, damping) = (per_angle * answer.slope, per_angle * damping);
                     let moment = rest.edge * answer.moment;

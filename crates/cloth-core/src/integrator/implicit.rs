@@ -88,9 +88,8 @@ impl Workspace {
         ahead: f64,
     ) {
         let start = Instant::now();
-        let (models, memory, accept) = system.models_to_settle();
-        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, accept, psd };
-        self.assembler.elements.linearise(models, memory, &mut self.corners, x, v, &linear);
+        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, accept: false, psd };
+        system.linearise(&mut self.assembler.elements, &mut self.corners, x, v, linear);
         let middle = Instant::now();
         let masses = system.masses();
         let scale = 1.0 + dt * system.air_damping();
