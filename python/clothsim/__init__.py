@@ -30,7 +30,7 @@ from clothsim.errors import (
     SimulationStuck,
     SolverFailed,
 )
-from clothsim.material import Material, materials
+from clothsim.material import Fabric, Material, materials
 from clothsim.mesh import Mesh
 from clothsim.recording import Body, Recording
 from clothsim.scene import Animation, Scene
@@ -41,6 +41,7 @@ __all__ = [
     "Body",
     "CheckpointError",
     "ClothSimError",
+    "Fabric",
     "Frame",
     "GpuUnavailable",
     "IntersectingStart",

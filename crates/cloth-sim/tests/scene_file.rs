@@ -295,3 +295,59 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_fabric_takes_the_law_that_the_scene_asks_for() {
+    use cloth_core::Bending;
+    let scene = |material: &str| {
+        Scene::parse_toml(
+            &format!(
+                "duration = 1.0\n[[cloth]]\nname = \"c\"\nmesh = {{ generator = \"grid\", width = 1.0, height = 1.0, nx = 3, ny = 3 }}\nmaterial = {material}\n"
+            ),
+            "test.toml",
+        )
+    };
+    let of = |material: &str| match &scene(material).unwrap().cloth[0].material {
+        MaterialChoice::Fabric(choice) => choice.material().unwrap().bending,
+        MaterialChoice::Given(material) => material.bending,
+        MaterialChoice::Named(name) => panic!("{name}"),
+    };
+    let Bending::Hysteresis(law) = of("{ fabric = \"cotton\", bending = \"hysteresis\", plasticity = 0.2 }")
+    else {
+        panic!("hysteresis")
+    };
+    assert_eq!((law.plasticity, law.fatigue), (0.2, 0.0));
+    assert!(law.coercive_couple.is_some_and(|c| c > 0.0));
+    assert!(matches!(of("{ fabric = \"cotton\" }"), Bending::Hinge { .. }));
+    let own =
+        "{ areal_density = 0.2, in_plane = { model = \"spring\", stiffness = 9.0 }, bending = BENDING }";
+    let linear = of(&own.replace("BENDING", "{ model = \"linear\", rigidity = 1e-5 }"));
+    assert_eq!(linear, Bending::Hinge { rigidity: 1e-5, damping: 0.0 });
+    assert!(matches!(
+        of(&own.replace("BENDING", "{ model = \"spring\", stiffness = 1.0 }")),
+        Bending::Spring { .. }
+    ));
+
+    let fails = |material: &str| scene(material).unwrap_err();
+    let error = fails("{ fabric = \"coton\", bending = \"hysteresis\" }");
+    assert_eq!((error.key.as_str(), error.nearest.as_deref()), ("cloth[0].material.fabric", Some("cotton")));
+    let error = fails("{ fabric = \"cotton\", bending = \"hysterisis\" }");
+    assert_eq!(
+        (error.key.as_str(), error.nearest.as_deref()),
+        ("cloth[0].material.bending", Some("hysteresis"))
+    );
+    assert_eq!(fails("{ fabric = \"cotton\", plasticity = 0.2 }").key, "cloth[0].material.plasticity");
+    let steep = "{ fabric = \"cotton\", bending = \"hysteresis\", fatigue = 1.5 }";
+    assert_eq!(fails(steep).key, "cloth[0].material.fatigue");
+    let error = fails(&own.replace("BENDING", "{ model = \"hysteresis\", rigidty = 1e-5 }"));
+    assert_eq!(
+        (error.key.as_str(), error.nearest.as_deref()),
+        ("cloth[0].material.bending.rigidty", Some("rigidity"))
+    );
+    let error = fails(&own.replace("BENDING", "{ model = \"hysteresis\", rigidity = 1e-5 }"));
+    assert_eq!(error.key, "cloth[0].material.bending.coercive_couple");
+    assert_eq!(
+        fails(&own.replace("BENDING", "{ model = \"rubber\" }")).key,
+        "cloth[0].material.bending.model"
+    );
+}

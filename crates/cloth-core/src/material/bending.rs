@@ -11,6 +11,7 @@ use crate::{
     Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
 )]
 #[serde(tag = "model", rename_all = "kebab-case", deny_unknown_fields)]
+#[schemars(transform = with_aliases)]
 pub enum Bending {
     /// No resistance to bending.
     #[default]
@@ -39,6 +40,19 @@ pub enum Bending {
     Plastic(PlasticBending),
     /// Hysteresis loop with residual curvature and fatigue (4.4–4.12).
     Hysteresis(HysteresisBending),
+}
+
+/// Lists variants under their second name too.
+fn with_aliases(schema: &mut schemars::Schema) {
+    const ALIASES: [(&str, &str); 2] = [("bending-spring", "spring"), ("hinge", "linear")];
+    let Some(serde_json::Value::Array(variants)) = schema.get_mut("oneOf") else { return };
+    for (name, alias) in ALIASES {
+        let named = |v: &&serde_json::Value| v.pointer("/properties/model/const").is_some_and(|c| c == name);
+        if let Some(mut variant) = variants.iter().find(named).cloned() {
+            variant["properties"]["model"]["const"] = alias.into();
+            variants.push(variant);
+        }
+    }
 }
 
 /// The curve of first loading: either from measured values, `rigidity`, `coercive_couple` and `transition_curvature`, or

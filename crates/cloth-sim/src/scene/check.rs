@@ -108,23 +108,28 @@ impl Scene {
         cloth: &Cloth,
         key: &str,
     ) -> Result<cloth_core::Material, SceneError> {
-        match &cloth.material {
-            MaterialChoice::Named(name) => library::named(name).map_err(|_| {
-                let known = library::names();
-                self.error(&format!("{key}.material"), format!("one of {known:?}"), format!("\"{name}\""))
-                    .with_nearest(name, known.into_iter())
-            }),
-            MaterialChoice::Given(material) => match material.check() {
-                Ok(()) => Ok(*material),
-                Err(CoreError::Parameter { name, expected, got }) => {
-                    Err(self.error(&format!("{key}.material.{name}"), expected, format!("{got}")))
-                }
-                Err(CoreError::Missing { name, expected }) => {
-                    Err(self.error(&format!("{key}.material.{name}"), expected, "nothing"))
-                }
-                Err(other) => Err(self.error(&format!("{key}.material"), "a material", other.to_string())),
-            },
-        }
+        let key = format!("{key}.material");
+        let (name_key, result) = match &cloth.material {
+            MaterialChoice::Named(name) => (key.clone(), library::named(name)),
+            MaterialChoice::Fabric(choice) => (format!("{key}.fabric"), choice.material()),
+            MaterialChoice::Given(material) => (key.clone(), material.check().map(|()| *material)),
+        };
+        result.map_err(|error| match error {
+            CoreError::UnknownMaterial { got, known } => self
+                .error(&name_key, format!("one of {known:?}"), format!("\"{got}\""))
+                .with_nearest(&got, known.into_iter()),
+            CoreError::Parameter { name, expected, got } => {
+                let name = match &cloth.material {
+                    MaterialChoice::Fabric(_) => name.trim_start_matches("bending."),
+                    _ => name,
+                };
+                self.error(&format!("{key}.{name}"), expected, format!("{got}"))
+            }
+            CoreError::Missing { name, expected } => {
+                self.error(&format!("{key}.{name}"), expected, "nothing")
+            }
+            other => self.error(&key, "a material", other.to_string()),
+        })
     }
 
     fn check_pin(&self, pin: &Pin, key: &str) -> Result<(), SceneError> {

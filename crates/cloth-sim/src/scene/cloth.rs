@@ -1,7 +1,7 @@
 //! A piece of cloth: mesh, material, start, pins.
 
 use super::{Keyframe, Rotation};
-use cloth_core::Material;
+use cloth_core::{Bending, CoreError, Material, material::library};
 use serde::{Deserialize, Serialize};
 
 /// A piece of cloth.
@@ -184,8 +184,66 @@ pub enum DiagonalPattern {
 pub enum MaterialChoice {
     /// A material of the library.
     Named(String),
+    /// A material of the library under a bending law of its loop.
+    Fabric(FabricChoice),
     /// Its own parameters.
     Given(Material),
+}
+
+/// A material of the library under a bending law.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FabricChoice {
+    /// Name of the material.
+    pub fabric: String,
+    /// Its bending law; B, 2HB and the transition curvature come from the library.
+    #[serde(default)]
+    pub bending: FabricBending,
+    /// λ in [0, 1]: share of a residual curvature that stays (`hysteresis`).
+    #[serde(default)]
+    pub plasticity: f64,
+    /// μ in [0, 1]: share of the friction that a full cycle takes away (`hysteresis`).
+    #[serde(default)]
+    pub fatigue: f64,
+}
+
+/// Bending law of a library material.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FabricBending {
+    /// No resistance to bending.
+    None,
+    /// B alone.
+    #[default]
+    Linear,
+    /// The curve of first loading, there and back.
+    Nonlinear,
+    /// The loop.
+    Hysteresis,
+}
+
+impl FabricChoice {
+    /// The material that is chosen.
+    ///
+    /// # Errors
+    /// [`CoreError`] naming the parameter that does not fit.
+    pub fn material(&self) -> Result<Material, CoreError> {
+        let law = match self.bending {
+            FabricBending::None => "none",
+            FabricBending::Linear => "linear",
+            FabricBending::Nonlinear => "nonlinear",
+            FabricBending::Hysteresis => "hysteresis",
+        };
+        let mut material = library::named_with(&self.fabric, law)?;
+        let shares = [("plasticity", self.plasticity), ("fatigue", self.fatigue)];
+        if let Bending::Hysteresis(law) = &mut material.bending {
+            (law.plasticity, law.fatigue) = (self.plasticity, self.fatigue);
+        } else if let Some((name, got)) = shares.into_iter().find(|(_, value)| *value != 0.0) {
+            return Err(CoreError::Parameter { name, expected: "0 without bending = \"hysteresis\"", got });
+        }
+        material.check()?;
+        Ok(material)
+    }
 }
 
 /// What the undeformed shape is.

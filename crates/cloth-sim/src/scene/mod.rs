@@ -13,7 +13,10 @@ mod schema;
 mod source;
 mod world;
 
-pub use cloth::{BoxRegion, Cloth, DiagonalPattern, Generator, MaterialChoice, MeshSource, Pin, RestSource};
+pub use cloth::{
+    BoxRegion, Cloth, DiagonalPattern, FabricBending, FabricChoice, Generator, MaterialChoice, MeshSource,
+    Pin, RestSource,
+};
 pub use collider::{Collider, SequenceSource, ShapeSource};
 pub use file::FileReference;
 pub use motion::{Keyframe, Rotation};
