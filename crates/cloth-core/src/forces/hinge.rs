@@ -72,21 +72,20 @@ struct Angle {
     gradient: [Vec3; 4],
 }
 
-/// What the element `k` of a range remembers.
-#[inline]
-fn read<L: BendingLaw>(memory: &[f64], k: usize) -> L::Memory {
-    if words::<L>() == 0 {
-        return L::Memory::default();
-    }
-    bytemuck::pod_read_unaligned(bytemuck::cast_slice(&memory[k * words::<L>()..][..words::<L>()]))
+/// What the elements of a range remember; empty for laws without memory.
+fn places<L: BendingLaw>(memory: &[f64]) -> &[L::Memory] {
+    if words::<L>() == 0 { &[] } else { bytemuck::cast_slice(memory) }
 }
 
-#[inline]
-fn write<L: BendingLaw>(memory: &mut [f64], k: usize, place: &L::Memory) {
-    if words::<L>() > 0 {
-        memory[k * words::<L>()..][..words::<L>()]
-            .copy_from_slice(bytemuck::cast_slice(std::slice::from_ref(place)));
-    }
+/// As [`places`], to be moved on.
+fn places_mut<L: BendingLaw>(memory: &mut [f64]) -> &mut [L::Memory] {
+    if words::<L>() == 0 { &mut [] } else { bytemuck::cast_slice_mut(memory) }
+}
+
+/// What the element `k` of a range remembers.
+#[inline(always)]
+fn place<L: BendingLaw>(places: &[L::Memory], k: usize) -> L::Memory {
+    if words::<L>() == 0 { L::Memory::default() } else { places[k] }
 }
 
 /// Signed dihedral angle [rad] of corners (e0, e1, opposite, opposite).
@@ -159,7 +158,7 @@ impl<L: BendingLaw> Hinges<L> {
         &self,
         rest: &Rest,
         mut place: L::Memory,
-        memory: &mut [f64],
+        places: &mut [L::Memory],
         k: usize,
         value: f64,
         rate: f64,
@@ -168,7 +167,9 @@ impl<L: BendingLaw> Hinges<L> {
         let curvature = Self::curvature(rest, &place, value);
         if accept {
             self.law.advance(&mut place, curvature);
-            write::<L>(memory, k, &place);
+            if words::<L>() > 0 {
+                places[k] = place;
+            }
         }
         self.law.moment(&place, curvature, rate)
     }
@@ -245,36 +246,34 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
     }
 
     fn accept(&self, range: Range<usize>, x: &[Vec3], memory: &mut [f64]) {
-        for (k, element) in range.enumerate() {
+        for (element, place) in range.zip(places_mut::<L>(memory)) {
             let angle = dihedral_angle(&self.corners_of(element, x));
-            let mut place = read::<L>(memory, k);
-            let curvature = Self::curvature(&self.rest[element], &place, angle);
-            self.law.advance(&mut place, curvature);
-            write::<L>(memory, k, &place);
+            self.law.advance(place, Self::curvature(&self.rest[element], place, angle));
         }
     }
 
     fn hinge_states(&self, memory: &[f64]) -> Vec<HingeState> {
-        let state = |(k, vertices): (usize, &[u32; 4])| {
-            let place = read::<L>(memory, k);
-            let curvature = L::last(&place)?;
-            let moment = self.law.moment(&place, curvature, 0.0).moment;
-            Some(HingeState { vertices: *vertices, curvature, moment, place: self.law.place(&place) })
+        let state = |(vertices, place): (&[u32; 4], &L::Memory)| {
+            let curvature = L::last(place)?;
+            let moment = self.law.moment(place, curvature, 0.0).moment;
+            Some(HingeState { vertices: *vertices, curvature, moment, place: self.law.place(place) })
         };
-        self.vertices.iter().enumerate().filter_map(state).collect()
+        self.vertices.iter().zip(places::<L>(memory)).filter_map(state).collect()
     }
 
     fn add_energy(&self, range: Range<usize>, x: &[Vec3], memory: &[f64], energy: &mut Energy) {
+        let places = places::<L>(memory);
         for (k, element) in range.enumerate() {
-            let (rest, place) = (&self.rest[element], read::<L>(memory, k));
+            let (rest, place) = (&self.rest[element], place::<L>(places, k));
             let curvature = Self::curvature(rest, &place, dihedral_angle(&self.corners_of(element, x)));
             energy.bending += rest.edge * rest.height * self.law.moment(&place, curvature, 0.0).energy;
         }
     }
 
     fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], memory: &[f64], out: &mut [Vec3]) {
+        let places = places::<L>(memory);
         for ((k, element), f) in range.enumerate().zip(out.chunks_exact_mut(4)) {
-            let (rest, place) = (&self.rest[element], read::<L>(memory, k));
+            let (rest, place) = (&self.rest[element], place::<L>(places, k));
             let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
             let curvature = Self::curvature(rest, &place, value);
             let mut torque = rest.edge * self.law.moment(&place, curvature, 0.0).moment;
@@ -299,19 +298,20 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         couplings: Couplings<'_>,
     ) {
         let damping = self.damping;
+        let places = places_mut::<L>(memory);
         let first = range.start;
         match couplings {
             Couplings::Outer(outer) => {
                 for (((k, element), f), outer) in range.enumerate().zip(forces.chunks_exact_mut(4)).zip(outer)
                 {
-                    let (rest, place) = (&self.rest[element], read::<L>(memory, k));
+                    let (rest, place) = (&self.rest[element], place::<L>(places, k));
                     let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
                     let [v0, v1, v2, v3] = self.corners_of(element, v);
                     // Σ g_a = 0, so the rate needs differences only.
                     let rate = gradient[1].dot(&(v1 - v0))
                         + gradient[2].dot(&(v2 - v0))
                         + gradient[3].dot(&(v3 - v0));
-                    let answer = self.answer(rest, place, memory, k, value, rate, linear.accept);
+                    let answer = self.answer(rest, place, places, k, value, rate, linear.accept);
                     let per_angle = rest.edge / rest.height;
                     // A negative slope has no place in a positive semi-definite block.
                     let stiffness = per_angle * answer.slope.max(0.0);
@@ -328,12 +328,12 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                 for (((k, element), f), blocks) in
                     range.enumerate().zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
                 {
-                    let (rest, place) = (&self.rest[element], read::<L>(memory, k));
+                    let (rest, place) = (&self.rest[element], place::<L>(places, k));
                     let corners = self.corners_of(element, x);
                     let velocity = self.corners_of(element, v);
                     let Angle { value, gradient } = Self::angle(rest, &corners);
                     let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
-                    let answer = self.answer(rest, place, memory, k, value, rate, linear.accept);
+                    let answer = self.answer(rest, place, places, k, value, rate, linear.accept);
                     let per_angle = rest.edge / rest.height;
                     let (stiffness, damping) = (per_angle * answer.slope, per_angle * damping);
                     let moment = rest.edge * answer.moment;
