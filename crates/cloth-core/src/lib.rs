@@ -22,6 +22,7 @@ mod energy;
 mod environment;
 mod error;
 mod integrator;
+mod part;
 mod system;
 
 pub use effect::EffectInfo;
@@ -31,5 +32,6 @@ pub use error::{CoreError, StepError};
 pub use forces::Psd;
 pub use integrator::{Integrator, IntegratorParams, Method, Pins, StepInfo};
 pub use material::{Bending, InPlane, Material};
+pub use part::ClothPart;
 pub use solver::{SolveError, SolveInfo, SolverMethod, SolverParams};
-pub use system::{ClothPart, ClothSystem};
+pub use system::ClothSystem;
