@@ -126,7 +126,7 @@ CATALOGUE = (
     _thesis("4.7", "A full loop and partial cycles of bending, curvature against moment", module="figure_4_7"),
     _thesis("4.8", "A cloth twisted by a rotating rod, let go and spread out", module="figure_4_8"),
     _thesis("4.9", "A closed body of cloth squeezed by a shrinking box and let go", module="figure_4_9"),
-    _thesis("4.10", "A human character experiment and results comparison"),
+    _thesis("4.10", "A figure in trousers sits down and stands up", module="figure_4_10"),
     _thesis("4.11", "A sphere hits a piece of hanging cloth, four bending laws", module="figure_4_11"),
     _thesis("4.12", "A walking figure in a skirt, four bending laws", module="figure_4_12"),
     _thesis("4.13", "Cloth clamped n times by two planes, then hung, two bending laws", module="figure_4_13"),

@@ -30,6 +30,7 @@ _ARM, _FOREARM, _FOOT = 0.27, 0.25, 0.15
 _TOLERANCE = 2e-3  # of the capsules' triangles [m]
 _SAMPLES = 60.0  # keyframes per second
 STANDING = ANKLE + SHANK + THIGH - HIP[1]  # height of the pelvis with straight legs
+APART = 0.07  # how far the legs point outward when sitting down and standing up [rad]
 _WAIST = 0.045  # of garments, above the middle of the pelvis
 
 
@@ -43,6 +44,8 @@ class Pose:
         Its middle [m].
     yaw, lean : float
         The pelvis's turn about y, the trunk's lean forward.
+    apart : float
+        By how much both legs point outward.
     hip, knee, ankle, shoulder, elbow : (float, float)
         Flexion; a knee bends backward.
     """
@@ -50,6 +53,7 @@ class Pose:
     pelvis: tuple[float, float, float] = (0.0, STANDING, 0.0)
     yaw: float = 0.0
     lean: float = 0.0
+    apart: float = 0.0
     hip: tuple[float, float] = (0.0, 0.0)
     knee: tuple[float, float] = (0.0, 0.0)
     ankle: tuple[float, float] = (0.0, 0.0)
@@ -122,8 +126,8 @@ def seated(bend: float) -> Pose:
     )
     reach = 0.5 * math.sin(math.pi * bend) + 0.6 * bend
     return Pose(
-        pelvis=pelvis, lean=lean, hip=(hip, hip), knee=(knee, knee), ankle=(-shank, -shank), shoulder=(reach, reach),
-        elbow=(0.2 + 0.3 * bend, 0.2 + 0.3 * bend),
+        pelvis=pelvis, lean=lean, apart=APART, hip=(hip, hip), knee=(knee, knee), ankle=(-shank, -shank),
+        shoulder=(reach, reach), elbow=(0.2 + 0.3 * bend, 0.2 + 0.3 * bend),
     )  # fmt: skip
 
 
@@ -179,7 +183,7 @@ def _bones(pose: Pose) -> dict[str, tuple[Floats, Floats, float, float]]:
         start = place + body @ np.array([sign * HIP[0], HIP[1], 0.0])
         angle = -pose.hip[side]
         for part, length, bend in (("thigh", THIGH, pose.knee[side]), ("shank", SHANK, 0.0)):
-            rotation = body @ _turn(0, angle)
+            rotation = body @ _turn(0, angle) @ _turn(2, sign * pose.apart)
             end = start - length * rotation[:, 1]
             bones[f"{name} {part}"] = (0.5 * (start + end), rotation, _RADII[part], 0.5 * length)
             start, angle = end, angle + bend
@@ -270,7 +274,7 @@ def skirt(
     return Mesh(np.concatenate(points), _tube(rings)), rings[0]
 
 
-def trousers(around: int, *, ease: float = 0.012, hem: float = 0.13) -> tuple[Mesh, list[int]]:
+def trousers(around: int, *, ease: float = 0.02, hem: float = 0.16) -> tuple[Mesh, list[int]]:
     """Trousers and the vertices of their waist.
 
     A tube of ``around`` (divisible by 4) vertices about the hips forks at a seam that runs under the body from front to
@@ -312,9 +316,12 @@ def trousers(around: int, *, ease: float = 0.012, hem: float = 0.13) -> tuple[Me
         for r in range(1, below + 1):
             part = r / below
             mixed = smooth(part / 0.3)
-            wide = 0.088 - 0.012 * part
+            wide = 0.095 - 0.010 * part
+            aside = sign * math.tan(APART) * max(0.0, STANDING + HIP[1] - (1.0 - part) * fork - part * hem)
             target_angle = (1.0 - mixed) * angles + mixed * equal
-            circle = middle + wide * np.column_stack([np.cos(target_angle), np.sin(target_angle)])
+            circle = (
+                middle + np.array([aside, 0.0]) + wide * np.column_stack([np.cos(target_angle), np.sin(target_angle)])
+            )
             xz = (1.0 - mixed) * start[:, [0, 2]] + mixed * circle
             heights = (1.0 - part) * start[:, 1] + part * hem
             rings.append(list(range(len(points), len(points) + len(first))))
