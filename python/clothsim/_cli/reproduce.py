@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", metavar="OUT", type=_folder, help="output folder")
     parser.add_argument("--list", action="store_true", help="list every figure and table of both papers with its state")
     parser.add_argument("--quick", action="store_true", help="a coarse variant of the same experiment, in seconds")
+    parser.add_argument("--mesh", metavar="FILE", type=Path, help="a mesh of your own, for figure 4.9")
     parser.add_argument("--overwrite", action="store_true", help="replace the figure if OUT holds it")
     parser.add_argument("--threads", metavar="N", type=int, help="how many threads (default: all)")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
@@ -48,6 +49,7 @@ def execute(options: argparse.Namespace) -> int:
     threads = check_threads(options.threads)
     effort = Effort(
         quick=options.quick,
+        mesh=options.mesh,
         progress=not (options.quiet or options.json),
         **({} if threads is None else {"threads": threads}),
     )

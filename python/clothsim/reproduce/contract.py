@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, CancelledError, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from clothsim._arrays import optional
@@ -135,11 +136,14 @@ class Effort:
         How many threads.
     progress : bool
         Show a bar on stderr.
+    mesh : Path, optional
+        A mesh to use instead of the generated one, for figures whose module has ``TAKES_MESH = True``.
     """
 
     quick: bool = False
     threads: int = field(default_factory=_threads)
     progress: bool = False
+    mesh: Path | None = None
 
     def bar(self, total: int, name: str, unit: str = "step") -> Bar:
         """Return a progress bar with an estimate of the time left; use it in a ``with``."""

@@ -120,8 +120,7 @@ def here(measured: Measured) -> str:
 
 def checks(measured: Measured) -> Sequence[Check]:
     """The thesis's order."""
-    # The trousers hang folded on the legs under every law: their shape does not tell the laws apart.
-    return residual.checks(measured.runs, "thesis 4.5.2, figure 4.10", shape=False)
+    return residual.checks(measured.runs, "thesis 4.5.2, figure 4.10")
 
 
 def draw(measured: Measured) -> bytes:

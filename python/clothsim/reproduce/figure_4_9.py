@@ -17,12 +17,14 @@ from clothsim.reproduce.figure_4_8 import FABRICS
 from clothsim.reproduce.residual import Run
 from clothsim.scene import Scene
 
-__all__ = ["THESIS", "body", "checks", "draw", "here", "measure", "parameters", "tables"]
+__all__ = ["TAKES_MESH", "THESIS", "body", "checks", "draw", "here", "measure", "parameters", "tables"]
 
 THESIS = (
     "b1 = 4.64, b2 = 1.40, c1 = −2.15, μ = 0.02: without plasticity the squeezed body returns to its original bending "
     "configuration but for gravity, with λ = 0.08 and 0.25 residual wrinkles and folds stay, more with the larger"
 )
+
+TAKES_MESH = True
 
 MOMENTS = ("start", "box closing", "squeezed", "box opening", "recovered")
 
@@ -90,14 +92,15 @@ def measure(effort: Effort) -> Measured:
     setup = Setup()
     if effort.quick:
         setup = replace(setup, subdivisions=2, thickness=4e-3, closing=0.5, opening=0.4, resting=0.4, dt=5e-3)
-    source = getattr(effort, "mesh", None)
-    mesh = _placed(body(setup.subdivisions) if source is None else Mesh.load(source), setup)
+    mesh = _placed(body(setup.subdivisions) if effort.mesh is None else Mesh.load(effort.mesh), setup)
     closed, held, opened, end = setup.times
     moments = [round(t, 2) for t in (0.0, 0.6 * closed, closed, held + 0.5 * (opened - held), end)]
     with effort.bar(round(100 * end) * len(FABRICS), "figure 4.9", "frame") as bar:
         names = list(FABRICS)
         runs = effort.each(lambda name: residual.run(_scene(name, mesh, setup), moments, bar.update), names, bar)
-    return Measured(setup, mesh, "generated" if source is None else str(source), dict(zip(names, runs, strict=True)))
+    return Measured(
+        setup, mesh, "generated" if effort.mesh is None else str(effort.mesh), dict(zip(names, runs, strict=True))
+    )
 
 
 def _placed(mesh: Mesh, setup: Setup) -> Mesh:

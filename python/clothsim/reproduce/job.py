@@ -13,7 +13,7 @@ from typing import Any
 from clothsim._core import __version__
 from clothsim._files import write_whole
 from clothsim._run.folder import RunFolder
-from clothsim.errors import OutputExists
+from clothsim.errors import InvalidInput, OutputExists
 from clothsim.reproduce.catalogue import Entry, find
 from clothsim.reproduce.contract import Check, Effort
 
@@ -84,19 +84,25 @@ def reproduce(name: str, out: str | Path, effort: Effort | None = None, *, overw
     Raises
     ------
     InvalidInput
-        The name is not known (the nearest known one is named), or there is nothing to measure.
+        The name is not known (the nearest known one is named), there is nothing to measure, or the figure takes no
+        mesh.
     OutputExists
         The folder holds a run or this figure already.
     """
     entry = find(name)
     module = entry.load()
     effort = effort or Effort()
+    if effort.mesh is not None and not getattr(module, "TAKES_MESH", False):
+        expected = f"no mesh: {entry.kind} {entry.number} has its own"
+        raise InvalidInput(
+            f"--mesh: expected {expected}, got {effort.mesh}", name="mesh", expected=expected, got=str(effort.mesh)
+        )
     start = time.perf_counter()
     with _folder(Path(out), entry, overwrite=overwrite) as folder:
         measured = module.measure(effort)
         parameters = {
             "figure": f"{entry.paper}, {entry.kind} {entry.number}: {entry.title}",
-            "made by": f"clothsim {__version__}: clothsim reproduce {entry.name}{' --quick' if effort.quick else ''}",
+            "made by": f"clothsim {__version__}: clothsim reproduce {entry.name}{_options(effort)}",
             **module.parameters(measured),
         }
         outcome = Outcome(entry, module.THESIS, module.here(measured), list(module.checks(measured)))
@@ -115,6 +121,11 @@ def reproduce(name: str, out: str | Path, effort: Effort | None = None, *, overw
         facts = {**outcome.facts(), "parameters": parameters}
         write_whole(folder / f"{entry.stem}.json", (json.dumps(facts, indent=2, ensure_ascii=False) + "\n").encode())
     return outcome
+
+
+def _options(effort: Effort) -> str:
+    mesh = f" --mesh {effort.mesh}" if effort.mesh is not None else ""
+    return mesh + (" --quick" if effort.quick else "")
 
 
 @contextmanager
