@@ -1,10 +1,10 @@
 //! The features of two leaves against each other: boxes of one against blocks of eight.
 
-use super::build::{Leaf, Tree};
+use super::build::Tree;
 use super::refit::Boxes;
 #[cfg(target_arch = "x86_64")]
 use crate::bounds::avx::Avx2;
-use crate::bounds::{Compare, LANES, MovingBox, Plain, lanes};
+use crate::bounds::{Compare, LANES, Plain, lanes};
 
 /// Candidates of one task, waiting for the narrow phase.
 #[derive(Debug, Default)]
@@ -118,7 +118,9 @@ fn features_with<const ENDS: usize>(
     let (leaf_a, leaf_b) = (&tree.leaves[a as usize], &tree.leaves[b as usize]);
     let (box_a, box_b) = (&boxes.hulls[a as usize], &boxes.hulls[b as usize]);
 
-    let mut vertices_against_triangles = |leaf: &Leaf, other: u32, other_box: &MovingBox<ENDS>| {
+    // A loop, not a closure called twice: what is not inlined here knows nothing of the vector instructions.
+    let sides = [(leaf_a, b, box_b), (leaf_b, a, box_a)];
+    for &(leaf, other, other_box) in &sides[..if a == b { 1 } else { 2 }] {
         let (blocks, ids) = (&boxes.blocks[other as usize], &tree.triangle_ids[other as usize]);
         for block in leaf.vertex_blocks[0]..leaf.vertex_blocks[1] {
             let vertices = &boxes.vertex_blocks[block as usize];
@@ -129,10 +131,6 @@ fn features_with<const ENDS: usize>(
                 }
             }
         }
-    };
-    vertices_against_triangles(leaf_a, b, box_b);
-    if a != b {
-        vertices_against_triangles(leaf_b, a, box_a);
     }
 
     for block_a in leaf_a.edge_blocks[0]..leaf_a.edge_blocks[1] {
