@@ -48,7 +48,7 @@ class Setup:
     closing: float = 1.6  # s
     held: float = 0.1
     opening: float = 1.2
-    resting: float = 2.2  # it still hops on the floor at the end; its shape has settled
+    resting: float = 2.2  # it still hops on the floor at the end
     dt: float = 3e-3
 
     @property
