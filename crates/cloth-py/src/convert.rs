@@ -59,22 +59,32 @@ pub(crate) fn triangles_from(
     vertex_count: usize,
 ) -> PyResult<Vec<[u32; 3]>> {
     const EXPECTED: &str = "shape (m, 3) and int32 or int64";
-    let indices: Vec<i64> = if let Ok(array) = value.extract::<PyReadonlyArray2<'_, i32>>() {
-        let flat = array.as_slice().map_err(|_| wrong(value, name, EXPECTED))?;
-        flat.iter().map(|&index| i64::from(index)).collect()
+    if value.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() != 2 || array.shape()[1] != 3) {
+        return Err(wrong(value, name, EXPECTED));
+    }
+    let triangles = if let Ok(array) = value.extract::<PyReadonlyArray2<'_, i32>>() {
+        narrowed(array.as_slice().map_err(|_| wrong(value, name, EXPECTED))?, vertex_count)
     } else if let Ok(array) = value.extract::<PyReadonlyArray2<'_, i64>>() {
-        array.as_slice().map_err(|_| wrong(value, name, EXPECTED))?.to_vec()
+        narrowed(array.as_slice().map_err(|_| wrong(value, name, EXPECTED))?, vertex_count)
     } else {
         return Err(wrong(value, name, EXPECTED));
     };
-    if value.cast::<PyUntypedArray>().is_ok_and(|array| array.shape()[1] != 3) {
-        return Err(wrong(value, name, EXPECTED));
+    triangles.map_err(|(index, triangle)| {
+        let got = format!("{index} in triangle {triangle}");
+        invalid_input(value.py(), name, &format!("indices in 0..{vertex_count}"), &got)
+    })
+}
+
+/// Triangles of indices in 0..`vertex_count`; else the first other index and its triangle.
+fn narrowed<T: Copy + Into<i64>>(flat: &[T], vertex_count: usize) -> Result<Vec<[u32; 3]>, (i64, usize)> {
+    // As unsigned numbers negative indices are the largest.
+    let outside = |index: T| index.into() as u64 >= vertex_count as u64;
+    if flat.iter().fold(false, |any, &index| any | outside(index))
+        && let Some(at) = flat.iter().position(|&index| outside(index))
+    {
+        return Err((flat[at].into(), at / 3));
     }
-    if let Some(at) = indices.iter().position(|&index| index < 0 || index as u64 >= vertex_count as u64) {
-        let got = format!("{} in triangle {}", indices[at], at / 3);
-        return Err(invalid_input(value.py(), name, &format!("indices in 0..{vertex_count}"), &got));
-    }
-    Ok(indices.chunks_exact(3).map(|t| [t[0] as u32, t[1] as u32, t[2] as u32]).collect())
+    Ok(flat.chunks_exact(3).map(|t| [t[0].into() as u32, t[1].into() as u32, t[2].into() as u32]).collect())
 }
 
 /// Numbers from an array of shape (n,), float64; finite or not.
@@ -163,7 +173,10 @@ pub(crate) fn indices_to_numpy<const K: usize>(
     rows: impl ExactSizeIterator<Item = [u32; K]>,
 ) -> Bound<'_, PyArray2<i64>> {
     let count = rows.len();
-    let flat: Vec<i64> = rows.flatten().map(i64::from).collect();
+    let mut flat: Vec<i64> = Vec::with_capacity(K * count);
+    for row in rows {
+        flat.extend_from_slice(&row.map(i64::from));
+    }
     rows_of(py, flat, count, K)
 }
 

@@ -4,6 +4,7 @@ use super::LEAF_TRIANGLES;
 use crate::bounds::{LANES, middle};
 use crate::{CollisionMesh, Vec3};
 use cloth_mesh::NONE;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// What does not change after the build: a tree per body, all of the same height.
@@ -79,17 +80,18 @@ impl Tree {
 /// The splits run on the pool, if there is one; they do not depend on it.
 pub(super) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::ThreadPool>) -> Tree {
     let origin = middle(x);
-    let mut items: Vec<Item> = mesh
-        .triangles
-        .iter()
-        .enumerate()
-        .map(|(t, tri)| {
-            // Thirds before the sum: no overflow.
-            let third = |v: u32| (x[v as usize] - origin) * (1.0 / 3.0);
-            let c = third(tri[0]) + third(tri[1]) + third(tri[2]);
-            Item { centroid: [c.x as f32, c.y as f32, c.z as f32], triangle: t as u32 }
-        })
-        .collect();
+    let item = |(t, tri): (usize, &[u32; 3])| {
+        // Thirds before the sum: no overflow.
+        let third = |v: u32| (x[v as usize] - origin) * (1.0 / 3.0);
+        let c = third(tri[0]) + third(tri[1]) + third(tri[2]);
+        Item { centroid: [c.x as f32, c.y as f32, c.z as f32], triangle: t as u32 }
+    };
+    let mut items: Vec<Item> = match pool {
+        Some(pool) => {
+            pool.install(|| mesh.triangles.par_iter().enumerate().with_min_len(PARALLEL).map(item).collect())
+        }
+        None => mesh.triangles.iter().enumerate().map(item).collect(),
+    };
     let mut tree = Tree::default();
     let mut levels: Vec<(u32, Range<u32>)> = vec![];
     // Triangles come body by body.
@@ -101,6 +103,10 @@ pub(super) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::Threa
             _ => arrange(items),
         }
         let first = tree.leaves.len() as u32;
+        let leaf_count = items.len().div_ceil(LEAF_TRIANGLES);
+        tree.leaves.reserve(leaf_count);
+        tree.triangle_ids.reserve(leaf_count);
+        tree.corners.reserve(leaf_count);
         for leaf in items.chunks(LEAF_TRIANGLES) {
             push_leaf(mesh, leaf, &mut tree);
         }

@@ -91,9 +91,10 @@ const NEXT: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 impl Joined {
     #[inline]
+    #[allow(clippy::needless_bitwise_bool, reason = "no branch: which corner it is cannot be foretold")]
     fn new(tree: &Tree, places: [u32; 2]) -> Self {
         let (first, second) = (corners(tree, places[0]), corners(tree, places[1]));
-        let is_common = |v: u32| second.contains(&v);
+        let is_common = |v: u32| (v == second[0]) | (v == second[1]) | (v == second[2]);
         let k = usize::from(is_common(first[1])) + 2 * usize::from(is_common(first[2]));
         let j = usize::from(second[1] == first[k]) + 2 * usize::from(second[2] == first[k]);
         Self { places, common: [k as u8, j as u8] }
