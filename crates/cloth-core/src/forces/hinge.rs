@@ -35,6 +35,9 @@ use crate::{
 /// Area relative to rest under which a triangle's normal no longer gives a full gradient.
 const COLLAPSED: f64 = 1e-4;
 
+/// Hinges whose angles are computed before their laws.
+const BLOCK: usize = 32;
+
 /// Hinges with one law.
 pub(crate) struct Hinges<L: BendingLaw> {
     law: L,
@@ -157,13 +160,13 @@ impl<L: BendingLaw> Hinges<L> {
     fn answer(
         &self,
         rest: &Rest,
-        mut place: L::Memory,
         places: &mut [L::Memory],
         k: usize,
         value: f64,
         rate: f64,
         accept: bool,
     ) -> Moment {
+        let mut place = place::<L>(places, k);
         let curvature = Self::curvature(rest, &place, value);
         if accept {
             self.law.advance(&mut place, curvature);
@@ -302,38 +305,49 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         let first = range.start;
         match couplings {
             Couplings::Outer(outer) => {
-                for (((k, element), f), outer) in range.enumerate().zip(forces.chunks_exact_mut(4)).zip(outer)
-                {
-                    let (rest, place) = (&self.rest[element], place::<L>(places, k));
-                    let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
-                    let [v0, v1, v2, v3] = self.corners_of(element, v);
-                    // Σ g_a = 0, so the rate needs differences only.
-                    let rate = gradient[1].dot(&(v1 - v0))
-                        + gradient[2].dot(&(v2 - v0))
-                        + gradient[3].dot(&(v3 - v0));
-                    let answer = self.answer(rest, place, places, k, value, rate, linear.accept);
-                    let per_angle = rest.edge / rest.height;
-                    // A negative slope has no place in a positive semi-definite block.
-                    let stiffness = per_angle * answer.slope.max(0.0);
-                    let damping = per_angle * damping;
-                    let torque = rest.edge * answer.moment + (damping + linear.ahead * stiffness) * rate;
-                    for c in 0..4 {
-                        f[c] = gradient[c] * -torque;
-                        outer.gradient[c] = [gradient[c].x, gradient[c].y, gradient[c].z];
+                let blocks = forces.chunks_mut(4 * BLOCK).zip(outer.chunks_mut(BLOCK));
+                for (block, (forces, outer)) in blocks.enumerate() {
+                    // Angles first, laws after: the laws of several hinges then run side by side.
+                    let (mut angles, mut rates) = ([0.0; BLOCK], [0.0; BLOCK]);
+                    for (k, outer) in outer.iter_mut().enumerate() {
+                        let element = first + block * BLOCK + k;
+                        let Angle { value, gradient } =
+                            Self::angle(&self.rest[element], &self.corners_of(element, x));
+                        let [v0, v1, v2, v3] = self.corners_of(element, v);
+                        // Σ g_a = 0, so the rate needs differences only.
+                        rates[k] = gradient[1].dot(&(v1 - v0))
+                            + gradient[2].dot(&(v2 - v0))
+                            + gradient[3].dot(&(v3 - v0));
+                        angles[k] = value;
+                        outer.gradient = gradient.map(Into::into);
                     }
-                    outer.scale = linear.stiffness * stiffness + linear.damping * damping;
+                    for (k, (f, outer)) in forces.chunks_exact_mut(4).zip(outer).enumerate() {
+                        let at = block * BLOCK + k;
+                        let rest = &self.rest[first + at];
+                        let answer = self.answer(rest, places, at, angles[k], rates[k], linear.accept);
+                        let per_angle = rest.edge / rest.height;
+                        // A negative slope has no place in a positive semi-definite block.
+                        let stiffness = per_angle * answer.slope.max(0.0);
+                        let damping = per_angle * damping;
+                        let torque =
+                            rest.edge * answer.moment + (damping + linear.ahead * stiffness) * rates[k];
+                        for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
+                            *f = Vec3::from(*gradient) * -torque;
+                        }
+                        outer.scale = linear.stiffness * stiffness + linear.damping * damping;
+                    }
                 }
             }
             Couplings::Blocks(blocks) => {
                 for (((k, element), f), blocks) in
                     range.enumerate().zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
                 {
-                    let (rest, place) = (&self.rest[element], place::<L>(places, k));
+                    let rest = &self.rest[element];
                     let corners = self.corners_of(element, x);
                     let velocity = self.corners_of(element, v);
                     let Angle { value, gradient } = Self::angle(rest, &corners);
                     let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
-                    let answer = self.answer(rest, place, places, k, value, rate, linear.accept);
+                    let answer = self.answer(rest, places, k, value, rate, linear.accept);
                     let per_angle = rest.edge / rest.height;
                     let (stiffness, damping) = (per_angle * answer.slope, per_angle * damping);
                     let moment = rest.edge * answer.moment;
