@@ -16,7 +16,7 @@ const TOLERANCE: f64 = 2e-6;
 /// Relative size of a fault that the comparison must see.
 const FAULT: f64 = 1e-4;
 /// Relative rounding of sums.
-const ROUNDING: f64 = 1e-11;
+const ROUNDING: f64 = 1e-12;
 
 /// Repeatable numbers in [−1, 1].
 pub(crate) struct Random(u64);
