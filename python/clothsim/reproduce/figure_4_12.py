@@ -227,7 +227,7 @@ def parameters(measured: Measured) -> Mapping[str, Any]:
         **FABRIC.named(), **{f"{key} [SI]": value for key, value in asdict(measured.setup).items()},
         "integrator": "implicit Euler", "bending damping": 0.0, "linear": "rigidity b2",
         "plastic": f"rigidity b2, elastic limit K0 = {FABRIC.k0:.4f} 1/cm, no hardening",
-        "figure": "capsules that walk on the spot", "period drawn [s]": measured.shown, "measured from [s]": begin,
+        "mannequin": "capsules that walk on the spot", "period drawn [s]": measured.shown, "measured from [s]": begin,
         "measured to [s]": end, "frames per second": FPS,
         "chosen": "all but b1, b2, c1, lambda, mu, bending damping: the thesis does not state them",
     }  # fmt: skip

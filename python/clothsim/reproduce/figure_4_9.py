@@ -178,7 +178,8 @@ def here(measured: Measured) -> str:
 
 def checks(measured: Measured) -> Sequence[Check]:
     """The thesis's order."""
-    return residual.checks(measured.runs, "thesis 4.5.2, figure 4.9")
+    # The body hops on the floor and is dented where it lands: its shape at one moment says nothing of the order.
+    return residual.checks(measured.runs, "thesis 4.5.2, figure 4.9", rests=False)
 
 
 def draw(measured: Measured) -> bytes:
