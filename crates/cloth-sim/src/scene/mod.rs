@@ -22,7 +22,7 @@ pub use file::FileReference;
 pub use motion::{Keyframe, Rotation};
 pub use output::Output;
 pub use source::SceneError;
-pub use world::{Air, Contact, Time, Up};
+pub use world::{Air, Contact, ContactMethod, Time, Up};
 
 pub(crate) use bounds::{LENGTH, VELOCITY};
 use cloth_core::SolverParams;

@@ -71,10 +71,23 @@ impl Default for Air {
     }
 }
 
+/// How contact with colliders is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContactMethod {
+    /// Impulses after the dynamics (Bridson et al. 2002).
+    #[default]
+    VelocityFilter,
+    /// Constraints in the implicit solve for cloth vertices on colliders (Baraff and Witkin 1998); impulses for the rest.
+    Constraints,
+}
+
 /// Contact of cloth with itself, other cloth and colliders.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Contact {
+    /// How contact with colliders is kept: "velocity-filter", or "constraints" (implicit integrators only).
+    pub method: ContactMethod,
     /// Distance at which surfaces rest on each other [m], > 0.
     pub thickness: f64,
     /// Detection method: "bvh", or "brute" (every pair, the oracle).
@@ -100,6 +113,7 @@ impl Default for Contact {
     fn default() -> Self {
         let response = cloth_response::ResponseParams::default();
         Self {
+            method: ContactMethod::default(),
             thickness: response.thickness,
             detector: "bvh".into(),
             self_collision: true,
