@@ -13,7 +13,7 @@
 use std::{sync::Arc, time::Instant};
 
 use cloth_core::{
-    Bending, ClothPart, ClothSystem, Environment, Integrator, IntegratorParams, Material, Pins,
+    Bending, ClothPart, ClothSystem, Environment, HingeCoupling, Integrator, IntegratorParams, Material, Pins,
     material::{HysteresisBending, NonlinearBending, PlasticBending, library},
     mesh::{RestShape, Topology, Vec3, generators},
 };
@@ -31,7 +31,7 @@ const TURNS: usize = 200;
 fn laws() -> [(&'static str, Bending); 4] {
     let (b1, b2, c1) = (Some(2e-5), Some(1e-5), Some(-5e-7));
     [
-        ("hinge", Bending::Hinge { rigidity: 1e-5, damping: 0.0 }),
+        ("hinge", Bending::Hinge { rigidity: 1e-5, damping: 0.0, hinges: HingeCoupling::Coupled }),
         ("nonlinear", Bending::Nonlinear(NonlinearBending { b1, b2, c1, ..NonlinearBending::default() })),
         (
             "plastic",
@@ -40,6 +40,7 @@ fn laws() -> [(&'static str, Bending); 4] {
                 elastic_limit: 10.0,
                 hardening: 0.0,
                 damping: 0.0,
+                hinges: HingeCoupling::Coupled,
             }),
         ),
         (

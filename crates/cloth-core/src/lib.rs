@@ -31,7 +31,7 @@ pub use environment::Environment;
 pub use error::{CoreError, StepError};
 pub use forces::Psd;
 pub use integrator::{Integrator, IntegratorParams, Method, Pins, StepInfo};
-pub use material::{Bending, InPlane, Material};
+pub use material::{Bending, HingeCoupling, InPlane, Material};
 pub use part::ClothPart;
 pub use solver::{SolveError, SolveInfo, SolverMethod, SolverParams};
 pub use system::ClothSystem;

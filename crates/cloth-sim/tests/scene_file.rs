@@ -298,7 +298,7 @@ proptest! {
 
 #[test]
 fn a_fabric_takes_the_law_that_the_scene_asks_for() {
-    use cloth_core::Bending;
+    use cloth_core::{Bending, HingeCoupling};
     let scene = |material: &str| {
         Scene::parse_toml(
             &format!(
@@ -322,7 +322,7 @@ fn a_fabric_takes_the_law_that_the_scene_asks_for() {
     let own =
         "{ areal_density = 0.2, in_plane = { model = \"spring\", stiffness = 9.0 }, bending = BENDING }";
     let linear = of(&own.replace("BENDING", "{ model = \"linear\", rigidity = 1e-5 }"));
-    assert_eq!(linear, Bending::Hinge { rigidity: 1e-5, damping: 0.0 });
+    assert_eq!(linear, Bending::Hinge { rigidity: 1e-5, damping: 0.0, hinges: HingeCoupling::Coupled });
     assert!(matches!(
         of(&own.replace("BENDING", "{ model = \"spring\", stiffness = 1.0 }")),
         Bending::Spring { .. }

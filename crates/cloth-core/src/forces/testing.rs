@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector, Rotation3, SymmetricEigen, Vector3};
 
-use super::{ForceModel, Linear, Psd};
+use super::{ForceModel, Linear, Psd, Survey};
 use crate::{
     Energy,
-    assembly::{Assembler, BlockMatrix, Corners},
+    assembly::{Assembler, BlockMatrix, Corners, surveyed},
     mesh::Vec3,
 };
 
@@ -59,10 +59,17 @@ impl Model {
     }
 }
 
+fn survey(model: &Model, x: &[Vec3]) -> Survey<Vec<f64>> {
+    let mut survey = Survey::new(&*model.law);
+    survey.take(&*model.law, &model.memory, x);
+    survey
+}
+
 /// Forces per vertex.
 pub(crate) fn forces(model: &Model, x: &[Vec3], v: &[Vec3]) -> Vec<Vec3> {
     let mut corners = vec![Vec3::zeros(); model.law.vertices().len()];
-    model.law.forces(0..model.law.count(), x, v, &model.memory, &mut corners);
+    let all = 0..model.law.count();
+    model.law.forces(all.clone(), x, v, &model.memory, surveyed(&survey(model, x), all), &mut corners);
     scatter(model, &corners, x.len())
 }
 
@@ -76,7 +83,8 @@ fn scatter(model: &Model, corners: &[Vec3], n: usize) -> Vec<Vec3> {
 
 pub(crate) fn energy(model: &Model, x: &[Vec3]) -> f64 {
     let mut energy = Energy::default();
-    model.law.add_energy(0..model.law.count(), x, &model.memory, &mut energy);
+    let all = 0..model.law.count();
+    model.law.add_energy(all.clone(), x, &model.memory, surveyed(&survey(model, x), all), &mut energy);
     energy.elastic()
 }
 

@@ -138,7 +138,7 @@ fn evaluate(
 ) -> Merit {
     work.corners.evaluate(system.models(), system.settled_memory(), x1, v1);
     system.gather(&mut work.corners, v1, -dt, &mut work.residual);
-    let mut potential = system.potential(x1, v1, dt, &mut work.corners.clock);
+    let mut potential = system.potential(x1, v1, dt, &mut work.corners);
     let mut squares = 0.0;
     for (i, (r, m)) in work.residual.iter_mut().zip(system.masses()).enumerate() {
         let dv = v1[i] - v0[i];
