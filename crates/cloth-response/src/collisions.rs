@@ -69,7 +69,9 @@ impl Hit {
         let gap_t0 = stencil.normal.dot(&start);
         let gap_t1 = gap_t0.clamp(LEAST_GAP * gap, gap);
         let law = NormalLaw { least: (gap_t1 - gap_t0) / motion.dt, spring: 0.0, cap: f64::NEG_INFINITY };
-        let friction = params.friction.coefficient(mesh, self.vertices[0], self.vertices[3]);
+        let friction = params.friction.laws()
+            [params.friction.index_of(mesh, self.vertices[0], self.vertices[3])]
+        .kinetic_coefficient();
         Contact::new(&stencil, motion.inv_mass, law, friction)
     }
 }

@@ -116,6 +116,8 @@ pub(crate) fn contact(
         None => (*stencil, gap_t0 + dt * normal_velocity(stencil)),
     };
     let law = law(gap_t0, gap_t1, normal_velocity(&stencil), gap, params.repulsion_stiffness, dt);
-    let friction = params.friction.coefficient(mesh, stencil.vertices[0], stencil.vertices[3]);
+    let friction = params.friction.laws()
+        [params.friction.index_of(mesh, stencil.vertices[0], stencil.vertices[3])]
+    .kinetic_coefficient();
     Contact::new(&stencil, motion.inv_mass, law, friction)
 }

@@ -7,7 +7,7 @@ use crate::motion::{Motion, MotionBuffers, bytes_of};
 use crate::repulsion::{self, BAND};
 use crate::sweeps::ContactSet;
 use crate::zones::{Zones, move_zones};
-use crate::{ResponseError, ResponseInfo, ResponseParams, Vec3};
+use crate::{LimitedEdge, ResponseError, ResponseInfo, ResponseParams, Vec3};
 use cloth_collision::{Bvh, CollisionMesh, Detector, StencilKind};
 use std::collections::HashSet;
 use std::time::Instant;
@@ -24,6 +24,7 @@ pub struct Responder {
     frames: Frames,
     zones: Zones,
     hits: Vec<Hit>,
+    limited: Vec<LimitedEdge>,
     /// Contacts on sides and corners that are in the set already.
     shared: HashSet<[u32; 4]>,
 }
@@ -43,6 +44,7 @@ impl Responder {
             frames: Frames::default(),
             zones: Zones::default(),
             hits: Vec::new(),
+            limited: Vec::new(),
             shared: HashSet::new(),
         })
     }
@@ -60,6 +62,22 @@ impl Responder {
         Ok(())
     }
 
+    /// Sets the edges whose strain is limited; none: the effect is off.
+    ///
+    /// # Errors
+    /// [`ResponseError::Parameter`] for a limit or a rest length out of range, or an edge with a vertex that `mesh` does not have.
+    pub fn set_strain_limits(
+        &mut self,
+        mesh: &CollisionMesh,
+        edges: Vec<LimitedEdge>,
+    ) -> Result<(), ResponseError> {
+        for edge in &edges {
+            edge.check(mesh.vertex_count)?;
+        }
+        self.limited = edges;
+        Ok(())
+    }
+
     /// Memory of the buffers that are kept from step to step \[B\]: what each vertex needs from the start, and what the
     /// contacts of the steps so far have needed.
     pub fn bytes(&self) -> usize {
@@ -71,6 +89,7 @@ impl Responder {
             + self.frames.bytes()
             + self.zones.bytes()
             + bytes_of(&self.hits)
+            + bytes_of(&self.limited)
             + slots
     }
 
@@ -133,7 +152,7 @@ impl Responder {
         v: &mut [Vec3],
         dt: f64,
     ) -> Result<ResponseInfo, ResponseError> {
-        let Self { params, rest_x, buffers, contacts, frames, zones, hits, shared } = self;
+        let Self { params, rest_x, buffers, contacts, frames, zones, hits, shared, .. } = self;
         let (mesh, count) = (detection.mesh, detection.mesh.vertex_count);
         check_input(count, inv_mass, x_t0, x_t1, v, dt)?;
         let mut info = ResponseInfo::default();
@@ -287,7 +306,7 @@ fn check(name: &'static str, values: &[Vec3], count: usize) -> Result<(), Respon
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::FrictionRule;
+    use crate::{FrictionLaw, FrictionRule};
     use cloth_collision::Body;
     use cloth_collision::mesh::{TriMesh, generators::grid};
 
@@ -320,7 +339,7 @@ mod tests {
         let dt = 0.005;
         let mut x_t1: Vec<Vec3> = x_t0.iter().zip(&v_t0).map(|(x, v)| x + v * dt).collect();
         let mut v = v_t0.clone();
-        let friction = FrictionRule { self_friction: friction, ..FrictionRule::default() };
+        let friction = FrictionRule::uniform(FrictionLaw::Coulomb { mu_c: friction });
         let params = ResponseParams { thickness: 0.004, friction, ..ResponseParams::default() };
         let mut responder = Responder::new(&mesh, params).unwrap();
         let mut bvh = Bvh::new(&mesh, &x_t0).unwrap();

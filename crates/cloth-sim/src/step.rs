@@ -11,7 +11,7 @@ use crate::scene::Contact;
 use crate::{Scene, SimError, Simulation, StepReport, Vec3};
 use cloth_collision::{Body, Bvh, CollisionMesh, Detector, detector, intersections};
 use cloth_core::{Pins, StepError, StepInfo};
-use cloth_response::{FrictionRule, Responder, ResponseError, ResponseInfo, ResponseParams};
+use cloth_response::{FrictionLaw, FrictionRule, Responder, ResponseError, ResponseInfo, ResponseParams};
 use std::time::Instant;
 
 /// The state that a checkpoint holds.
@@ -94,15 +94,14 @@ impl ContactStage {
         } else {
             Some(detector(&contact.detector, &mesh, x).map_err(|e| stage("detector", &e))?)
         };
-        let own = scene.collider.iter().map(|c| c.friction.unwrap_or(contact.friction));
+        let coefficient = |a: usize, b: usize| match a.max(b).checked_sub(bodies.cloth.len()) {
+            None => contact.self_friction,
+            Some(collider) => scene.collider[collider].friction.unwrap_or(contact.friction),
+        };
         let params = ResponseParams {
             thickness: contact.thickness,
             repulsion_stiffness: contact.repulsion_stiffness,
-            friction: FrictionRule {
-                self_friction: contact.self_friction,
-                bodies: vec![contact.self_friction; bodies.cloth.len()].into_iter().chain(own).collect(),
-                default: contact.friction,
-            },
+            friction: FrictionRule::from_pairs(list.len(), |a, b| FrictionLaw::Coulomb { mu_c: coefficient(a, b) }),
             max_passes: contact.max_passes,
             max_zone_passes: contact.max_zone_passes,
             allow_initial_contacts: allow,
