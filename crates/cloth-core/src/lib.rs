@@ -30,7 +30,7 @@ pub use energy::Energy;
 pub use environment::Environment;
 pub use error::{CoreError, StepError};
 pub use forces::Psd;
-pub use integrator::{Integrator, IntegratorParams, Method, Pins, StepInfo};
+pub use integrator::{ActiveSet, Constraint, Integrator, IntegratorParams, Method, Pins, StepInfo};
 pub use material::{Bending, HingeCoupling, InPlane, Material};
 pub use part::ClothPart;
 pub use solver::{SolveError, SolveInfo, SolverMethod, SolverParams};
