@@ -175,6 +175,17 @@ impl ElementBuffers {
         }
     }
 
+    /// Adds to `out` what the exact stiffness of coupled models makes of the motions `d` beyond what they last wrote, of
+    /// models that write outer products.
+    pub(crate) fn add_beyond(&self, models: &[Box<dyn ForceModel>], d: &[Vec3], out: &mut [Vec3]) {
+        let mut rest = self.outer.as_slice();
+        for model in models.iter().filter(|m| m.coupling(Psd::Projected) == CouplingKind::Outer) {
+            let mine;
+            (mine, rest) = rest.split_at(model.count());
+            model.add_beyond(mine, d, out);
+        }
+    }
+
     /// Memory [B].
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.blocks.as_slice())

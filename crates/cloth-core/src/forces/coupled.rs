@@ -11,11 +11,12 @@
 //!
 //! Torque on hinge i: Σ_j C_ij θ_j, over at most four neighbours.
 //!
-//! The matrix takes products by a bound on its diagonal: in units of the plate's squares the products of a triangle are
-//! cos²φ_ij, with largest eigenvalue λ − 1; D = (λ − 1) · plate's squares bounds them and couples no vertices that a hinge does
-//! not couple.
+//! The matrix takes products by a bound on its diagonal, which couples no vertices that a hinge does not couple. In units of
+//! the plate's squares a triangle has the matrix R = cos²φ_ij with eigenvalues λ_1 ≤ λ_2 ≤ λ_3 in [0, 3]. A single step takes
+//! R by λ_3: bending then never has less stiffness than it has, and a step never overshoots. Iterations take it by
+//! (λ_1 + λ_3)/2 and not less than 1: at least half of R, so that each descends, and what is left of an error shrinks fastest.
 //!
-//! Source: Grinspun et al. 2006 (curvature of a triangle from the angles at its edges, "midedge normals").
+//! Source: Grinspun et al. 2006 for the curvature of a triangle from the angles over its edges.
 
 use nalgebra::{Matrix3, SymmetricEigen};
 
@@ -46,6 +47,16 @@ impl Plate {
         })
     }
 
+    /// Least and greatest eigenvalue of cos²φ over its hinges; 1 without any.
+    fn extremes(&self, cosines: &Matrix3<f64>) -> [f64; 2] {
+        let has = |side: usize| self.hinges[side] != NONE;
+        // A side that is no hinge stands alone with the eigenvalue 1, which lies between the others.
+        let present =
+            Matrix3::from_fn(|a, b| if a == b || (has(a) && has(b)) { cosines[(a, b)] } else { 0.0 });
+        let values = SymmetricEigen::new(present).eigenvalues;
+        [values.min(), values.max()]
+    }
+
     /// What a plate of unit rigidity stores of the angle of a side: twice its energy over the angle's square.
     fn square(&self, side: usize) -> f64 {
         self.lengths[side] * self.lengths[side] / (4.0 * self.area)
@@ -63,8 +74,8 @@ pub(crate) struct Coupled {
     neighbours: Vec<[u32; 4]>,
     /// C_ij with each of them [J]; 0 with itself.
     factors: Vec<[f64; 4]>,
-    /// D of each hinge [J].
-    bounds: Vec<f64>,
+    /// What the matrix takes for them, per hinge [J]: of a single step, and of an iteration.
+    bounds: [Vec<f64>; 2],
 }
 
 impl Coupled {
@@ -82,18 +93,17 @@ impl Coupled {
         let mut coupled = Self {
             neighbours: (0..rest.len() as u32).map(|h| [h; 4]).collect(),
             factors: vec![[0.0; 4]; rest.len()],
-            bounds: vec![0.0; rest.len()],
+            bounds: [vec![0.0; rest.len()], vec![0.0; rest.len()]],
         };
         let mut found = vec![0; rest.len()];
         for plate in plates {
             let cosines = plate.cosines();
-            let present = Matrix3::from_fn(|a, b| {
-                let both = plate.hinges[a] != NONE && plate.hinges[b] != NONE;
-                if both { cosines[(a, b)] } else { 0.0 }
-            });
-            let excess = (SymmetricEigen::new(present).eigenvalues.max() - 1.0).max(0.0);
+            let [least, greatest] = plate.extremes(&cosines);
+            let bounds = [greatest - 1.0, (0.5 * (least + greatest) - 1.0).max(0.0)];
             for (a, i) in plate.sides() {
-                coupled.bounds[i] += rigidity * excess * shares[i] * plate.square(a);
+                for (sum, bound) in coupled.bounds.iter_mut().zip(bounds) {
+                    sum[i] += rigidity * bound * shares[i] * plate.square(a);
+                }
                 for (b, j) in plate.sides().filter(|&(b, _)| b != a) {
                     let scale = (shares[i] * plate.square(a) * shares[j] * plate.square(b)).sqrt();
                     coupled.neighbours[i][found[i]] = j as u32;
@@ -113,15 +123,16 @@ impl Coupled {
         (factors[0] * a + factors[1] * b) + (factors[2] * c + factors[3] * d)
     }
 
-    /// D of each hinge [J].
-    pub(crate) fn bounds(&self) -> &[f64] {
-        &self.bounds
+    /// What the matrix takes for the products of each hinge [J], in a single step or in an iteration.
+    #[inline]
+    pub(crate) fn bounds(&self, iterates: bool) -> &[f64] {
+        &self.bounds[usize::from(iterates)]
     }
 
     /// Memory, with the two numbers per hinge that an evaluation works with [B].
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.neighbours.as_slice())
             + size_of_val(self.factors.as_slice())
-            + 3 * size_of_val(self.bounds.as_slice())
+            + 4 * size_of_val(self.bounds[0].as_slice())
     }
 }

@@ -208,14 +208,14 @@ impl<L: BendingLaw> Hinges<L> {
 
     /// Torque of its neighbours on an element [N m].
     #[inline(always)]
-    fn from_neighbours(&self, element: usize, elastic: &[f64]) -> f64 {
+    fn neighbour_torque(&self, element: usize, elastic: &[f64]) -> f64 {
         self.coupled.as_ref().map_or(0.0, |coupled| coupled.torque(element, elastic))
     }
 
-    /// Bound on its products with its neighbours [N m].
+    /// What the matrix takes for its products with its neighbours [N m].
     #[inline(always)]
-    fn bound(&self, element: usize) -> f64 {
-        self.coupled.as_ref().map_or(0.0, |coupled| coupled.bounds()[element])
+    fn bound(&self, element: usize, iterates: bool) -> f64 {
+        self.coupled.as_ref().map_or(0.0, |coupled| coupled.bounds(iterates)[element])
     }
 
     /// Corner forces and exact blocks of an element at a curvature; `neighbours`: their torque [N m].
@@ -236,7 +236,7 @@ impl<L: BendingLaw> Hinges<L> {
         let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
         let answer = self.law.moment(&place, curvature, rate);
         let per_angle = rest.edge / rest.height;
-        let stiffness = per_angle * answer.slope + self.bound(element);
+        let stiffness = per_angle * answer.slope + self.bound(element, linear.iterates);
         let damping = per_angle * self.damping;
         let moment = rest.edge * answer.moment + neighbours;
         let torque = moment + (damping + linear.ahead * stiffness) * rate;
@@ -376,7 +376,7 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
             let (rest, place) = (&self.rest[element], place::<L>(places, k));
             let curvature = if self.coupled.is_some() {
                 // Half of each product: its other hinge has the other half.
-                let torque = self.from_neighbours(element, survey.elastic);
+                let torque = self.neighbour_torque(element, survey.elastic);
                 energy.bending += 0.5 * survey.elastic[element] * torque;
                 survey.work[k]
             } else {
@@ -400,7 +400,7 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
             let (rest, place) = (&self.rest[element], place::<L>(places, k));
             let corners = self.corners_of(element, x);
             let (curvature, gradient, neighbours) = if self.coupled.is_some() {
-                let neighbours = self.from_neighbours(element, survey.elastic);
+                let neighbours = self.neighbour_torque(element, survey.elastic);
                 (survey.work[k], Self::gradient(rest, &corners), neighbours)
             } else {
                 let Angle { value, gradient } = Self::angle(rest, &corners);
@@ -456,6 +456,21 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         }
     }
 
+    fn add_beyond(&self, couplings: &[Outer], d: &[Vec3], out: &mut [Vec3]) {
+        let Some(coupled) = &self.coupled else { return };
+        let elements = || couplings.iter().zip(&self.vertices);
+        let turn = |(outer, vertices): (&Outer, &[u32; 4])| -> f64 {
+            outer.gradient.iter().zip(vertices).map(|(g, &v)| Vec3::from(*g).dot(&d[v as usize])).sum()
+        };
+        let turns: Vec<f64> = elements().map(turn).collect();
+        for (element, (outer, vertices)) in elements().enumerate() {
+            let torque = coupled.torque(element, &turns) - coupled.bounds(false)[element] * turns[element];
+            for (g, &v) in outer.gradient.iter().zip(vertices) {
+                out[v as usize] += Vec3::from(*g) * torque;
+            }
+        }
+    }
+
     fn couple(
         &self,
         range: Range<usize>,
@@ -472,7 +487,7 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         match couplings {
             Couplings::Outer(outer) => {
                 for (((element, own), f), outer) in elements.zip(outer) {
-                    let torque = own + self.from_neighbours(element, survey.elastic);
+                    let torque = own + self.neighbour_torque(element, survey.elastic);
                     for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
                         *f = Vec3::from(*gradient) * -torque;
                     }
@@ -484,7 +499,7 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                     elements.zip(blocks.chunks_exact_mut(6)).enumerate()
                 {
                     let at =
-                        (place::<L>(places, k), *curvature, self.from_neighbours(element, survey.elastic));
+                        (place::<L>(places, k), *curvature, self.neighbour_torque(element, survey.elastic));
                     self.exact_blocks(element, x, v, linear, at, f, blocks);
                 }
             }
@@ -504,7 +519,7 @@ impl<L: BendingLaw> Hinges<L> {
         v: &[Vec3],
         linear: &super::Linear,
         places: &mut [L::Memory],
-        survey: Survey<&mut [f64]>,
+        Survey { elastic, work }: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         outer: &mut [Outer],
     ) {
@@ -532,13 +547,13 @@ impl<L: BendingLaw> Hinges<L> {
                 // A negative slope has no place in a positive semi-definite block.
                 let mut stiffness = per_angle * answer.slope.max(0.0);
                 if COUPLED {
-                    stiffness += self.bound(first + at);
+                    stiffness += self.bound(first + at, linear.iterates);
                 }
                 let damping = per_angle * self.damping;
                 let torque = rest.edge * answer.moment + (damping + linear.ahead * stiffness) * rates[k];
                 if COUPLED {
-                    survey.elastic[at] = rest.height * self.law.elastic(&place, curvature);
-                    survey.work[at] = torque;
+                    elastic[at] = rest.height * self.law.elastic(&place, curvature);
+                    work[at] = torque;
                 } else {
                     for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
                         *f = Vec3::from(*gradient) * -torque;

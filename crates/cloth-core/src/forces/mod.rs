@@ -70,6 +70,8 @@ pub(crate) struct Linear {
     pub(crate) stiffness: f64,
     /// Corner forces are f + `ahead` · K_x v, with the K_x of the couplings [s].
     pub(crate) ahead: f64,
+    /// Whether iterations follow, which make up for what the couplings are not exact in.
+    pub(crate) iterates: bool,
     /// Whether `x` has been accepted as the end of a motion: laws with memory then move on to it first.
     pub(crate) accept: bool,
     pub(crate) psd: Psd,
@@ -171,6 +173,10 @@ pub(crate) trait ForceModel: Send + Sync {
         _couplings: Couplings<'_>,
     ) {
     }
+
+    /// Adds to `out` what the exact −K_x of a coupled model makes of the corner motions `d` beyond its `couplings` of a
+    /// single step.
+    fn add_beyond(&self, _couplings: &[Outer], _d: &[Vec3], _out: &mut [Vec3]) {}
 
     /// Whether it resists bending.
     fn bends(&self) -> bool {

@@ -139,7 +139,8 @@ fn matrix_error(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
     (a - b).amax() / b.amax().max(1e-300)
 }
 
-const ELASTIC: Linear = Linear { damping: 0.0, stiffness: 1.0, ahead: 0.0, accept: false, psd: Psd::Raw };
+const ELASTIC: Linear =
+    Linear { damping: 0.0, stiffness: 1.0, ahead: 0.0, iterates: false, accept: false, psd: Psd::Raw };
 
 /// −dE/dx by central differences.
 fn force_by_differences(model: &Model, x: &[Vec3]) -> DVector<f64> {
@@ -211,8 +212,12 @@ pub(crate) fn check_blocks(model: &Model, x: &[Vec3], what: &str) {
 /// K_v against differences in the velocity, and corner forces f + τ K_x v against the blocks.
 pub(crate) fn check_velocity_terms(model: &Model, x: &[Vec3], v: &[Vec3], what: &str) {
     for psd in [Psd::Raw, Psd::Projected] {
-        let (_, d) =
-            linearised(model, x, v, &Linear { damping: 1.0, stiffness: 0.0, ahead: 0.0, accept: false, psd });
+        let (_, d) = linearised(
+            model,
+            x,
+            v,
+            &Linear { damping: 1.0, stiffness: 0.0, ahead: 0.0, iterates: false, accept: false, psd },
+        );
         let expected = blocks_by_differences(model, x, v, true);
         let scale = expected.amax();
         assert!(scale > 0.0, "{what}: the model must be damped here");

@@ -92,7 +92,9 @@ impl Workspace {
         ahead: f64,
     ) {
         let start = Instant::now();
-        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, accept: false, psd };
+        // Newton's method alone asks for forces with no step ahead of them.
+        let iterates = ahead == 0.0;
+        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, iterates, accept: false, psd };
         system.linearise(&mut self.assembler.elements, &mut self.corners, x, v, linear);
         let middle = Instant::now();
         let masses = system.masses();
