@@ -1,6 +1,7 @@
 //! Pairs that collide during the step: found, judged, answered by impulses.
 
 use crate::ResponseError;
+use crate::friction::kernel::Kernel;
 use crate::impulse::{Contact, NormalLaw};
 use crate::motion::Motion;
 use crate::repulsion::rest_gap;
@@ -51,13 +52,14 @@ impl Hit {
 
     /// The contact at the time of impact: along its normal the pair ends the step at its rest gap, or at its gap at
     /// the start where that is less, but no nearer than a tenth of the rest gap. `None` if all vertices are prescribed.
-    pub(crate) fn contact(
+    pub(crate) fn contact<K: Kernel>(
         &self,
         mesh: &CollisionMesh,
         params: &ResponseParams,
         rest_x: &[Vec3],
         motion: &Motion<'_>,
-    ) -> Option<Contact> {
+        kernel: &K,
+    ) -> Option<Contact<K::State>> {
         let at_contact = match self.kind {
             StencilKind::VertexTriangle => stencil_at_contact_vertex_triangle,
             StencilKind::EdgeEdge => stencil_at_contact_edge_edge,
@@ -69,9 +71,7 @@ impl Hit {
         let gap_t0 = stencil.normal.dot(&start);
         let gap_t1 = gap_t0.clamp(LEAST_GAP * gap, gap);
         let law = NormalLaw { least: (gap_t1 - gap_t0) / motion.dt, spring: 0.0, cap: f64::NEG_INFINITY };
-        let friction = params.friction.laws()
-            [params.friction.index_of(mesh, self.vertices[0], self.vertices[3])]
-        .kinetic_coefficient();
+        let friction = kernel.state(&params.friction, mesh, self.vertices[0], self.vertices[3]);
         Contact::new(&stencil, motion.inv_mass, law, friction)
     }
 }

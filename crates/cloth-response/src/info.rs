@@ -25,9 +25,9 @@ pub struct ResponseInfo {
     pub exempt: usize,
     /// Pairs that still collide, exempt ones aside: always 0 in an accepted step.
     pub remaining: usize,
-    /// Contacts that carry an impulse and stick.
+    /// Contacts with friction that carry an impulse and stick.
     pub sticking: usize,
-    /// Contacts that carry an impulse and slide.
+    /// Contacts with friction that carry an impulse and slide.
     pub sliding: usize,
     /// Edges of cloth that strain limiting pulled or pushed.
     pub limited_edges: usize,

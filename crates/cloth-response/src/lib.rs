@@ -17,6 +17,7 @@ mod params;
 mod repulsion;
 mod respond;
 mod rigid_motion;
+mod stages;
 mod strain;
 mod sweeps;
 mod zones;

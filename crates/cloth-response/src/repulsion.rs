@@ -16,6 +16,7 @@
 //! Rest gap: h for a vertex on a triangle. For two edges it is [`EDGE_GAP`] h: where surfaces are flat the vertices carry,
 //! and the edges between them, which add nothing but redundant contacts, stay idle; at a sharp edge the edges carry.
 
+use crate::friction::kernel::Kernel;
 use crate::impulse::{Contact, NormalLaw};
 use crate::motion::Motion;
 use crate::{ResponseParams, Vec3};
@@ -94,13 +95,14 @@ fn at_end(stencil: &Stencil, x_t1: &[Vec3]) -> Option<Stencil> {
 }
 
 /// The contact of a near pair; `None` if it cannot act or all its vertices are prescribed.
-pub(crate) fn contact(
+pub(crate) fn contact<K: Kernel>(
     stencil: &Stencil,
     mesh: &CollisionMesh,
     params: &ResponseParams,
     rest_x: &[Vec3],
     motion: &Motion<'_>,
-) -> Option<Contact> {
+    kernel: &K,
+) -> Option<Contact<K::State>> {
     let gap = rest_gap(stencil, mesh, params.thickness, rest_x);
     let gap_t0 = stencil.distance;
     if gap_t0 > BAND * gap {
@@ -116,8 +118,6 @@ pub(crate) fn contact(
         None => (*stencil, gap_t0 + dt * normal_velocity(stencil)),
     };
     let law = law(gap_t0, gap_t1, normal_velocity(&stencil), gap, params.repulsion_stiffness, dt);
-    let friction = params.friction.laws()
-        [params.friction.index_of(mesh, stencil.vertices[0], stencil.vertices[3])]
-    .kinetic_coefficient();
+    let friction = kernel.state(&params.friction, mesh, stencil.vertices[0], stencil.vertices[3]);
     Contact::new(&stencil, motion.inv_mass, law, friction)
 }

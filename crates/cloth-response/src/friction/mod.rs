@@ -5,6 +5,8 @@
 //! velocity that the contact itself made). The velocity is that after external and internal forces, so λ holds the
 //! weight that presses the pair and a contact below the friction angle sticks exactly.
 
+pub(crate) mod general;
+pub(crate) mod kernel;
 pub(crate) mod law;
 pub(crate) mod rule;
 

@@ -1,5 +1,7 @@
 //! Strain limiting: edges of cloth that may not get longer or shorter than a given fraction of their rest length.
 
+pub(crate) mod limiter;
+
 use crate::ResponseError;
 
 /// How far an edge may be strained.
