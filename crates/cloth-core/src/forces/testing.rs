@@ -143,7 +143,7 @@ const ELASTIC: Linear =
     Linear { damping: 0.0, stiffness: 1.0, ahead: 0.0, iterates: false, accept: false, psd: Psd::Raw };
 
 /// −dE/dx by central differences.
-fn force_by_differences(model: &Model, x: &[Vec3]) -> DVector<f64> {
+pub(crate) fn force_by_differences(model: &Model, x: &[Vec3]) -> DVector<f64> {
     let mut x = x.to_vec();
     DVector::from_fn(3 * x.len(), |k, _| {
         let (i, axis) = (k / 3, k % 3);
@@ -180,6 +180,12 @@ fn blocks_by_differences(model: &Model, x: &[Vec3], v: &[Vec3], velocity: bool) 
 
 /// Force against energy, with a planted fault, and [`check_blocks`].
 pub(crate) fn check_derivatives(model: &Model, x: &[Vec3], what: &str) {
+    check_force(model, x, what);
+    check_blocks(model, x, what);
+}
+
+/// Force against energy, with a planted fault.
+pub(crate) fn check_force(model: &Model, x: &[Vec3], what: &str) {
     let rest = vec![Vec3::zeros(); x.len()];
     let f = flat(&forces(model, x, &rest));
     let expected = force_by_differences(model, x);
@@ -187,8 +193,6 @@ pub(crate) fn check_derivatives(model: &Model, x: &[Vec3], what: &str) {
     let mut faulty = f.clone();
     faulty[f.iamax()] *= 1.0 + FAULT;
     assert!(error(&faulty, &expected) > TOLERANCE, "{what}: a fault in the force must be seen");
-
-    check_blocks(model, x, what);
 }
 
 /// Blocks against force, with a planted fault; symmetry; no negative eigenvalue when projected.
