@@ -13,6 +13,7 @@ pub use cloth_collision as collision;
 pub use cloth_core as core;
 pub use cloth_response as response;
 
+pub mod friction;
 pub mod scene;
 
 mod assets;

@@ -72,6 +72,18 @@ pub struct ContactReport {
     pub held_vertices: usize,
     /// Pairs exempt because they touch already at the start.
     pub exempt: usize,
+    /// Contacts that carry an impulse and stick.
+    pub sticking: usize,
+    /// Contacts that carry an impulse and slide.
+    pub sliding: usize,
+    /// Edges that the strain limit pulled or pushed.
+    pub limited_edges: usize,
+    /// Times that the strain limit was linearised anew.
+    pub strain_passes: usize,
+    /// Largest stretch l/l₀ − 1 of a limited edge after the step [-].
+    pub largest_stretch: f64,
+    /// Largest compression 1 − l/l₀ of an edge whose compression is limited, after the step [-].
+    pub largest_compression: f64,
 }
 
 impl ContactReport {
@@ -86,6 +98,12 @@ impl ContactReport {
         self.zone_vertices += info.zone_vertices;
         self.held_vertices += info.held_vertices;
         self.exempt = self.exempt.max(info.exempt);
+        self.sticking += info.sticking;
+        self.sliding += info.sliding;
+        self.limited_edges += info.limited_edges;
+        self.strain_passes += info.strain_passes;
+        self.largest_stretch = self.largest_stretch.max(info.largest_stretch);
+        self.largest_compression = self.largest_compression.max(info.largest_compression);
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::bodies::Bodies;
 use crate::guard::Guard;
 use crate::pins::PinSet;
+use crate::scene::Contact;
 use crate::step::{ContactStage, State};
 use crate::{Assets, BodyInfo, EffectCost, Plan, Report, Scene, SimError, Vec3, plan};
 use cloth_core::{ClothPart, ClothSystem, Energy, Environment, Integrator, IntegratorParams};
@@ -119,6 +120,11 @@ impl Simulation {
         let allow = options.allow_intersections;
         let contact = match &scene.contact {
             Some(contact) => Some(ContactStage::new(scene, contact, allow, &bodies, &pins, &state.x)?),
+            // Strain limits are met by the response, also where there is no contact.
+            None if scene.cloth.iter().any(|c| c.strain_limit.is_some()) => {
+                let contact = Contact::default();
+                Some(ContactStage::new(scene, &contact, allow, &bodies, &pins, &state.x)?)
+            }
             None => None,
         };
         let plan = plan::build(scene, &bodies, &integrator, contact.as_ref(), &pins, &state);

@@ -11,7 +11,7 @@ use crate::scene::Contact;
 use crate::{Scene, SimError, Simulation, StepReport, Vec3};
 use cloth_collision::{Body, Bvh, CollisionMesh, Detector, detector, intersections};
 use cloth_core::{Pins, StepError, StepInfo};
-use cloth_response::{FrictionLaw, FrictionRule, Responder, ResponseError, ResponseInfo, ResponseParams};
+use cloth_response::{FrictionRule, Responder, ResponseError, ResponseInfo, ResponseParams};
 use std::time::Instant;
 
 /// The state that a checkpoint holds.
@@ -63,6 +63,8 @@ pub(crate) struct ContactStage {
     responder: Responder,
     /// Whether known intersections are allowed.
     pub(crate) allow: bool,
+    /// Edges whose strain is limited.
+    pub(crate) limited_edges: usize,
 }
 
 impl ContactStage {
@@ -75,9 +77,11 @@ impl ContactStage {
         x: &[Vec3],
     ) -> Result<Self, SimError> {
         let allow = allow || contact.allow_intersections;
+        // Strain limits alone: nothing meets anything.
+        let meets = scene.contact.is_some();
         let cloth = bodies.cloth.iter().zip(&scene.cloth).map(|(body, source)| {
-            let self_collision = contact.self_collision && source.self_collision;
-            (Body { dynamic: true, self_collision }, body.x.len(), &body.mesh.triangles[..])
+            let self_collision = meets && contact.self_collision && source.self_collision;
+            (Body { dynamic: meets, self_collision }, body.x.len(), &body.mesh.triangles[..])
         });
         let colliders = bodies.colliders.iter().map(|body| {
             let rule = Body { dynamic: false, self_collision: false };
@@ -94,14 +98,10 @@ impl ContactStage {
         } else {
             Some(detector(&contact.detector, &mesh, x).map_err(|e| stage("detector", &e))?)
         };
-        let coefficient = |a: usize, b: usize| match a.max(b).checked_sub(bodies.cloth.len()) {
-            None => contact.self_friction,
-            Some(collider) => scene.collider[collider].friction.unwrap_or(contact.friction),
-        };
         let params = ResponseParams {
             thickness: contact.thickness,
             repulsion_stiffness: contact.repulsion_stiffness,
-            friction: FrictionRule::from_pairs(list.len(), |a, b| FrictionLaw::Coulomb { mu_c: coefficient(a, b) }),
+            friction: FrictionRule::from_pairs(list.len(), |a, b| scene.friction_law(contact, a, b)),
             max_passes: contact.max_passes,
             max_zone_passes: contact.max_zone_passes,
             allow_initial_contacts: allow,
@@ -113,7 +113,10 @@ impl ContactStage {
             rest_x[body.first_vertex..body.first_vertex + body.x.len()].copy_from_slice(&body.mesh.vertices);
         }
         responder.set_rest(&mesh, &rest_x).map_err(|e| stage("contact", &e))?;
-        Ok(Self { mesh, bvh, continuous, responder, allow })
+        let limited = bodies.limited_edges(scene, &pins.vertices);
+        let limited_edges = limited.len();
+        responder.set_strain_limits(&mesh, limited).map_err(|e| stage("strain limit", &e))?;
+        Ok(Self { mesh, bvh, continuous, responder, allow, limited_edges })
     }
 
     pub(crate) fn intersections(

@@ -35,6 +35,8 @@ impl Scene {
         self.not_negative("output.checkpoint_interval", self.output.checkpoint_interval, "s")?;
         self.check_contact()?;
         self.check_names()?;
+        self.check_all_friction()?;
+        self.check_strain_limits()?;
         for (i, cloth) in self.cloth.iter().enumerate() {
             self.check_cloth(cloth, &format!("cloth[{i}]"))?;
         }
@@ -47,8 +49,6 @@ impl Scene {
     fn check_contact(&self) -> Result<(), SceneError> {
         let Some(contact) = &self.contact else { return Ok(()) };
         self.positive("contact.thickness", contact.thickness, "m")?;
-        self.not_negative("contact.friction", contact.friction, "")?;
-        self.not_negative("contact.self_friction", contact.self_friction, "")?;
         self.not_negative("contact.repulsion_stiffness", contact.repulsion_stiffness, "N/m")?;
         self.at_least_one("contact.max_passes", contact.max_passes)?;
         if !DETECTORS.contains(&contact.detector.as_str()) {
@@ -192,9 +192,6 @@ impl Scene {
         self.finite(&format!("{key}.position"), &collider.position, "m")?;
         self.check_rotation(collider.rotation.as_ref(), &format!("{key}.rotation"))?;
         self.check_keyframes(&collider.keyframes, &format!("{key}.keyframes"))?;
-        if let Some(friction) = collider.friction {
-            self.not_negative(&format!("{key}.friction"), friction, "")?;
-        }
         Ok(())
     }
 

@@ -1,6 +1,6 @@
 //! A piece of cloth: mesh, material, start, pins.
 
-use super::{Keyframe, Rotation};
+use super::{Friction, Keyframe, Rotation, StrainLimitSource};
 use cloth_core::{Bending, CoreError, Material, material::library};
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +35,17 @@ pub struct Cloth {
     /// Whether it meets itself (if `contact.self` says so too).
     #[serde(default = "yes")]
     pub self_collision: bool,
+    /// Friction of this cloth on colliders that have none of their own: Coulomb's coefficient [-], ≥ 0, or a table with a
+    /// law; by default `contact.friction`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+    /// Friction of this cloth on itself, as `friction`; by default `contact.self_friction`. On other cloth the smoother of
+    /// the two counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub self_friction: Option<Friction>,
+    /// Largest strain of its edges: the stretch [-], > 0, or a table; without it edges are not limited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strain_limit: Option<StrainLimitSource>,
     /// Vertices whose motion is prescribed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<Pin>,

@@ -1,5 +1,6 @@
 //! What holds for the whole scene: axes, time, air, contact.
 
+use super::{Friction, PairFriction};
 use cloth_core::{IntegratorParams, Method, Psd};
 use serde::{Deserialize, Serialize};
 
@@ -95,10 +96,14 @@ pub struct Contact {
     /// Whether cloth meets itself; a piece of cloth may opt out with its own `self_collision`.
     #[serde(rename = "self")]
     pub self_collision: bool,
-    /// Coulomb coefficient of cloth on colliders [-], ≥ 0; a collider may have its own.
-    pub friction: f64,
-    /// Coulomb coefficient of cloth on cloth [-], ≥ 0.
-    pub self_friction: f64,
+    /// Friction of cloth on colliders: Coulomb's coefficient [-], ≥ 0, or a table with a law; a collider, a piece of cloth or
+    /// a pair may have its own.
+    pub friction: Friction,
+    /// Friction of cloth on cloth, as `friction`; a piece of cloth or a pair may have its own.
+    pub self_friction: Friction,
+    /// Friction of single pairs of bodies, before all other entries.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<PairFriction>,
     /// Stiffness of the repulsion of one contact within the thickness [N/m], ≥ 0.
     pub repulsion_stiffness: f64,
     /// Detection passes answered with impulses, ≥ 1.
@@ -117,8 +122,9 @@ impl Default for Contact {
             thickness: response.thickness,
             detector: "bvh".into(),
             self_collision: true,
-            friction: 0.3,
-            self_friction: 0.2,
+            friction: Friction::Coefficient(0.3),
+            self_friction: Friction::Coefficient(0.2),
+            pairs: Vec::new(),
             repulsion_stiffness: response.repulsion_stiffness,
             max_passes: response.max_passes,
             max_zone_passes: response.max_zone_passes,
