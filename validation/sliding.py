@@ -15,6 +15,7 @@ as well; there s = w^(1−δ_s) is integrated, whose equation is regular and has
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,9 +68,7 @@ def coulomb(mu: float) -> Law:
     return Law("coulomb", mu, mu)
 
 
-def laws(
-    mu_c: float, mu_s: float, v_s: float, delta_s: float, f_v: float, delta_v: float = 1.0
-) -> dict[str, Law]:
+def laws(mu_c: float, mu_s: float, v_s: float, delta_s: float, f_v: float, delta_v: float = 1.0) -> dict[str, Law]:
     """The four laws with one set of parameters, by the thesis's names."""
     return {
         "C": coulomb(mu_c),
@@ -104,7 +103,7 @@ def _stays_until(pull: Pull, x: float, limit: float, t: float, end: float) -> fl
         return abs(pull(time, x)) - limit
 
     looks = np.linspace(t, end, max(2, int(np.ceil((end - t) * LOOKS)) + 1))
-    for a, b in zip(looks, looks[1:], strict=False):
+    for a, b in pairwise(looks):
         if excess(b) > 0.0:
             return float(brentq(excess, a, b, xtol=1e-15, rtol=1e-14)) if excess(a) < 0.0 else float(a)
     return end
@@ -128,15 +127,11 @@ def _slip_from_balance(block: Block, pull: Pull, sign: float, t: float, x: float
         return float(y[1]) - (SWITCH * law.v_s) ** power
 
     fast.terminal = True  # type: ignore[attr-defined]
-    found = solve_ivp(
-        rate, (t, end), [x, 0.0], "DOP853", events=fast, rtol=RTOL, atol=[ATOL, 1e-12], dense_output=True
-    )
+    found = solve_ivp(rate, (t, end), [x, 0.0], "DOP853", events=fast, rtol=RTOL, atol=[ATOL, 1e-12], dense_output=True)
     return found, power
 
 
-def solve(
-    block: Block, pull: Pull, end: float, x: float = 0.0, v: float = 0.0, samples: int = 2001
-) -> Motion:
+def solve(block: Block, pull: Pull, end: float, x: float = 0.0, v: float = 0.0, samples: int = 2001) -> Motion:
     """The motion from x [m] with the velocity v [m/s] at t = 0 until ``end`` [s]."""
     law = block.law
     limit = law.mu_s * block.normal
@@ -180,9 +175,7 @@ def solve(
         stops.terminal, stops.direction = True, -1.0  # type: ignore[attr-defined]
         if t >= end:
             break
-        found = solve_ivp(
-            rate, (t, end), [x, w], "DOP853", events=stops, rtol=RTOL, atol=ATOL, dense_output=True
-        )
+        found = solve_ivp(rate, (t, end), [x, w], "DOP853", events=stops, rtol=RTOL, atol=ATOL, dense_output=True)
         write(found, t, float(found.t[-1]), sign)
         t, x, v = float(found.t[-1]), float(found.y[0, -1]), 0.0
         if found.status == 1:

@@ -1,0 +1,60 @@
+"""The tests of friction together, and what they are compared with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import block, capstan, cards, slope, sliding
+
+TESTS = {"cards": cards.run, "slope": slope.run, "block": block.run, "capstan": capstan.run}
+
+LAW = "friction as in K. Wong 2014, Improvements to Physically Based Cloth Simulation, equations 7.1 to 7.7"
+CARD = (
+    f"dv/dt = g sin a - F_k(v)/m, tan a = 0.3, solved in validation/sliding.py to 1e-10; {LAW}, parameters of "
+    "table 7.1, card"
+)
+BLOCK = (
+    f"m x'' = k (V t - x) - friction, with stick phases, solved in validation/sliding.py to 1e-10; {LAW}, parameters "
+    "of table 7.1, stick-slip"
+)
+STICK_SLIP = "2 D/V + (2/w) (pi - atan(D w/V)), D = (mu_s - mu_c) m g/k, w = sqrt(k/m): from the same equation"
+ANGLE = "balance of forces on a slope: C. A. Coulomb 1785, Theorie des machines simples"
+REST = "a card below its angle of friction rests"
+EULER = (
+    "T2/T1 = exp(mu phi): L. Euler 1769, Remarques sur l'effet du frottement dans l'equilibre, Memoires de l'academie "
+    "des sciences de Berlin 18, 265-278"
+)
+
+
+def rows() -> list[tuple[object, ...]]:
+    """Rows of targets.csv."""
+    solved, formula = "solution of an equation", "formula"
+    out: list[tuple[object, ...]] = []
+
+    def add(
+        test: str, case: str, quantity: str, unit: str, target: float, kind: str, source: str, note: str = ""
+    ) -> None:
+        out.append((test, case, quantity, unit, target, kind, None, None, None, None, source, note))
+
+    for name, law in cards.LAWS.items():
+        add("cards", name, "way in 2 s", "m", cards.target(law), solved, CARD, _parameters(law))
+    for mu in slope.COEFFICIENTS:
+        add("slope", f"mu_s {mu:g}", "angle", "degree", float(np.degrees(np.arctan(mu))), formula, ANGLE)
+    add("slope", f"{slope.BELOW:g} degree below atan {slope.REST_MU:g}", "drift over 60 s", "m/s", 0.0, formula, REST)
+    for name, law in block.LAWS.items():
+        way = float(block.solution(law, 5, 2).x[-1])
+        add("block", name, f"way in {block.SECONDS:g} s", "m", way, solved, BLOCK, _parameters(law))
+        if name == "C":
+            add("block", name, "stick phases after the first", "-", 0.0, solved, BLOCK)
+        else:
+            kind, source = (formula, STICK_SLIP) if name == "CS" else (solved, BLOCK)
+            add("block", name, "stick-slip period", "s", block.exact_period(name), kind, source)
+    for mu in capstan.COEFFICIENTS:
+        for wrap in capstan.WRAPS:
+            ratio = sliding.capstan(mu, float(np.radians(wrap)))
+            add("capstan", f"mu {mu:g}, {wrap:g} degrees", "ratio of tensions", "-", ratio, formula, EULER)
+    return out
+
+
+def _parameters(law: sliding.Law) -> str:
+    return ", ".join(f"{name} {value}" for name, value in law.table.items())
