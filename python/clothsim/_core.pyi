@@ -27,6 +27,9 @@ __all__ = [
     "edge_edge_ccd",
     "fabric",
     "fabric_sources",
+    "friction_force",
+    "friction_pairs",
+    "friction_sources",
     "grid",
     "material_named",
     "material_names",
@@ -62,6 +65,22 @@ def detect(
 def vertex_triangle_ccd(queries: _Floats, thickness: float) -> tuple[NDArray[np.bool_], _Floats]: ...
 def edge_edge_ccd(queries: _Floats, thickness: float) -> tuple[NDArray[np.bool_], _Floats]: ...
 def self_intersections(x: _Floats, triangles: _Ints, threads: int | None) -> _Ints: ...
+def friction_force(
+    model: str,
+    normal_force: _Floats,
+    velocity: _Floats,
+    applied: _Floats,
+    area: _Floats,
+    *,
+    mu_c: float | None,
+    mu_s: float | None,
+    v_s: float | None,
+    delta_s: float | None,
+    f_v: float | None,
+    delta_v: float | None,
+) -> _Floats: ...
+def friction_pairs() -> str: ...
+def friction_sources() -> list[tuple[str, str]]: ...
 def scene_schema() -> str: ...
 def material_names() -> list[str]: ...
 def material_named(name: str, bending: str) -> str: ...
