@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import block, capstan, cards, slope, sliding
+from . import block, capstan, cards, sliding, slope
 
 TESTS = {"cards": cards.run, "slope": slope.run, "block": block.run, "capstan": capstan.run}
 
-LAW = "friction as in K. Wong 2014, Improvements to Physically Based Cloth Simulation, equations 7.1 to 7.7"
+LAW = "friction as in T. H. Wong 2014, Improvements to Physically Based Cloth Simulation (thesis), equations 7.1 to 7.7"
 CARD = (
     f"dv/dt = g sin a - F_k(v)/m, tan a = 0.3, solved in validation/sliding.py to 1e-10; {LAW}, parameters of "
     "table 7.1, card"
