@@ -19,6 +19,8 @@ pub mod scene;
 mod assets;
 mod bodies;
 mod checkpoint;
+mod constraints;
+mod contact;
 mod error;
 mod guard;
 mod motion;

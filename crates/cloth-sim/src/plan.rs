@@ -1,10 +1,11 @@
 //! Which effects a scene runs, which it does not, and why: known before the first step.
 
 use crate::bodies::Bodies;
+use crate::contact::ContactStage;
 use crate::friction::LawName;
 use crate::pins::PinSet;
 use crate::scene::{Contact, ContactMethod};
-use crate::step::{ContactStage, State};
+use crate::step::State;
 use crate::{Scene, SceneError};
 use cloth_core::{CoreError, Integrator};
 use cloth_response::{FrictionLaw, LimitedEdge};
@@ -165,6 +166,15 @@ pub(crate) fn build(
         if !built.iter().any(|e| e.name == name) {
             effects.off(name, why);
         }
+    }
+    let coupling = integrator.system().hinge_coupling();
+    if coupling.elements > 0 {
+        effects.on(coupling.name, "bending.hinges = \"coupled\"", coupling.elements, coupling.bytes);
+    } else {
+        effects.off(
+            coupling.name,
+            "no material has bending.hinges = \"coupled\" and hinges that share a triangle",
+        );
     }
     let method = scene.time.integrator;
     effects.on(
