@@ -18,9 +18,9 @@
 
 use crate::friction::kernel::Kernel;
 use crate::impulse::{Contact, NormalLaw};
+use crate::landing::Landed;
 use crate::motion::Motion;
 use crate::{ResponseParams, Vec3};
-use cloth_collision::distance::{edge_edge, vertex_triangle};
 use cloth_collision::{CollisionMesh, Stencil, StencilKind};
 
 /// Pairs up to this multiple of the thickness are looked at: falling from the rest gap by g dt² in one step
@@ -32,8 +32,6 @@ pub(crate) const EDGE_GAP: f64 = 0.75;
 const REST_FRACTION: f64 = 0.5;
 /// The fraction of the overlap that one step may undo (3.36).
 const PUSH_FRACTION: f64 = 0.1;
-/// Least cosine between the normals at the start and at the candidate end of one contact.
-const LEAST_AGREEMENT: f64 = 0.5;
 
 /// The pair's rest gap [m].
 ///
@@ -64,45 +62,16 @@ fn law(gap_t0: f64, gap_t1: f64, v_n: f64, gap: f64, stiffness: f64, dt: f64) ->
     }
 }
 
-/// The stencil with the closest points at the candidate end of the step.
-///
-/// Where a pair slides by more than a fraction of its gap, the closest points and the normal at the start would take
-/// the motion along the surface for an approach (a card could not slide over a vertex of the plane). `None` if the
-/// pair turns too far to be the same contact, or two edges no longer cross.
-fn at_end(stencil: &Stencil, x_t1: &[Vec3]) -> Option<Stencil> {
-    let p = stencil.vertices.map(|v| x_t1[v as usize]);
-    let weights = match stencil.kind {
-        StencilKind::VertexTriangle => {
-            let w = vertex_triangle::closest_point(&p);
-            [1.0, -w[0], -w[1], -w[2]]
-        }
-        StencilKind::EdgeEdge => {
-            let (s, t) = edge_edge::closest_points(&p);
-            if s <= 0.0 || s >= 1.0 || t <= 0.0 || t >= 1.0 {
-                return None;
-            }
-            [1.0 - s, s, t - 1.0, -t]
-        }
-    };
-    let r: Vec3 = (1..4).map(|k| (p[k] - p[0]) * weights[k]).sum();
-    let distance = r.norm();
-    (stencil.normal.dot(&r) > LEAST_AGREEMENT * distance).then(|| Stencil {
-        weights,
-        normal: r / distance,
-        distance,
-        ..*stencil
-    })
-}
-
 /// The contact of a near pair; `None` if it cannot act or all its vertices are prescribed.
 pub(crate) fn contact<K: Kernel>(
-    stencil: &Stencil,
+    landed: &Landed,
     mesh: &CollisionMesh,
     params: &ResponseParams,
     rest_x: &[Vec3],
     motion: &Motion<'_>,
     kernel: &K,
 ) -> Option<Contact<K::State>> {
+    let stencil = &landed.start;
     let gap = rest_gap(stencil, mesh, params.thickness, rest_x);
     let gap_t0 = stencil.distance;
     if gap_t0 > BAND * gap {
@@ -113,7 +82,7 @@ pub(crate) fn contact<K: Kernel>(
         s.normal.dot(&u)
     };
     let dt = motion.dt;
-    let (stencil, gap_t1) = match at_end(stencil, &motion.buffers.end) {
+    let (stencil, gap_t1) = match landed.end {
         Some(end) => (end, end.distance),
         None => (*stencil, gap_t0 + dt * normal_velocity(stencil)),
     };
