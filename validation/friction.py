@@ -42,7 +42,7 @@ def rows() -> list[tuple[object, ...]]:
         add("slope", f"mu_s {mu:g}", "angle", "degree", float(np.degrees(np.arctan(mu))), formula, ANGLE)
     add("slope", f"{slope.BELOW:g} degree below atan {slope.REST_MU:g}", "drift over 60 s", "m/s", 0.0, formula, REST)
     for name, law in block.LAWS.items():
-        way = float(block.solution(law, 5, 2).x[-1])
+        way = float(block.solution(law, 2).x[-1])
         add("block", name, f"way in {block.SECONDS:g} s", "m", way, solved, BLOCK, _parameters(law))
         if name == "C":
             add("block", name, "stick phases after the first", "-", 0.0, solved, BLOCK)
