@@ -18,15 +18,7 @@ use support::{FREE, SOFT, distance, integrator, params, pool, sheet, system, und
 use HingeCoupling::{Coupled, Independent};
 
 fn with_hinges(material: &Material, coupling: HingeCoupling) -> Material {
-    let mut material = *material;
-    match &mut material.bending {
-        Bending::Hinge { hinges, .. } => *hinges = coupling,
-        Bending::Nonlinear(law) => law.hinges = coupling,
-        Bending::Plastic(law) => law.hinges = coupling,
-        Bending::Hysteresis(law) => law.hinges = coupling,
-        Bending::None | Bending::Spring { .. } => {}
-    }
-    material
+    Material { bending: material.bending.with_hinges(coupling), ..*material }
 }
 
 /// Every law with hinges.
@@ -134,7 +126,6 @@ fn rigidity(mesh: &TriMesh, cell: f64, coupling: HingeCoupling) -> f64 {
     let (mut x, mut v) = (mesh.vertices.clone(), vec![Vec3::zeros(); mesh.vertices.len()]);
     for _ in 0..4 {
         let info = integrator.step(&mut x, &mut v, 0.0, 1.0, &pins).unwrap();
-        println!("{coupling:?}: {} iterations", info.newton_iterations);
         assert!(info.converged, "{info:?}");
     }
     let tip: Vec<f64> =

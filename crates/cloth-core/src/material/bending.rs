@@ -255,6 +255,19 @@ impl Bending {
         }
     }
 
+    /// The same law with hinges that answer to each other as asked for; as it is without hinges.
+    #[must_use]
+    pub fn with_hinges(mut self, coupling: HingeCoupling) -> Self {
+        match &mut self {
+            Self::None | Self::Spring { .. } => {}
+            Self::Hinge { hinges, .. } => *hinges = coupling,
+            Self::Nonlinear(law) => law.hinges = coupling,
+            Self::Plastic(law) => law.hinges = coupling,
+            Self::Hysteresis(law) => law.hinges = coupling,
+        }
+        self
+    }
+
     /// Refuses values that give no law.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! A piece of cloth: mesh, material, start, pins.
 
 use super::{Friction, Keyframe, Rotation, StrainLimitSource};
-use cloth_core::{Bending, CoreError, Material, material::library};
+use cloth_core::{Bending, CoreError, HingeCoupling, Material, material::library};
 use serde::{Deserialize, Serialize};
 
 /// A piece of cloth.
@@ -216,6 +216,9 @@ pub struct FabricChoice {
     /// μ in [0, 1]: share of the friction that a full cycle takes away (`hysteresis`).
     #[serde(default)]
     pub fatigue: f64,
+    /// Whether the elastic part of the law acts across the hinges of a triangle.
+    #[serde(default)]
+    pub hinges: HingeCoupling,
 }
 
 /// Bending law of a library material.
@@ -252,6 +255,7 @@ impl FabricChoice {
         } else if let Some((name, got)) = shares.into_iter().find(|(_, value)| *value != 0.0) {
             return Err(CoreError::Parameter { name, expected: "0 without bending = \"hysteresis\"", got });
         }
+        material.bending = material.bending.with_hinges(self.hinges);
         material.check()?;
         Ok(material)
     }
