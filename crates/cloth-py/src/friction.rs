@@ -38,7 +38,8 @@ pub(crate) fn friction_force<'py>(
     let velocity = vertices_from(velocity, "tangential_velocity")?;
     let applied = vertices_from(applied, "applied_force")?;
     let rows = velocity.len();
-    let lengths = [("normal_force", normal_force.len()), ("applied_force", applied.len()), ("area", area.len())];
+    let lengths =
+        [("normal_force", normal_force.len()), ("applied_force", applied.len()), ("area", area.len())];
     if let Some((name, length)) = lengths.into_iter().find(|(_, length)| *length != rows) {
         return Err(invalid_input(py, name, &format!("{rows} rows"), &length.to_string()));
     }

@@ -8,7 +8,7 @@ use crate::scene::{Contact, ContactMethod};
 use crate::step::State;
 use crate::{Scene, SceneError};
 use cloth_core::{CoreError, Integrator};
-use cloth_response::{FrictionLaw, LimitedEdge};
+use cloth_response::FrictionLaw;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -195,7 +195,7 @@ pub(crate) fn build(
         );
     }
     plan_contact(&mut effects, scene, bodies, contact);
-    plan_strain(&mut effects, contact);
+    plan_strain(&mut effects, scene, contact);
     effects.on("guard", "always", bodies.cloth_vertices, 0);
 
     let mut warnings = Vec::new();
@@ -259,7 +259,8 @@ fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Op
             effects.off("contact constraints", "contact.method = \"velocity-filter\"");
         }
         ContactMethod::Constraints => {
-            let why = "contact.method = \"constraints\": cloth vertices on colliders";
+            let why =
+                "contact.method = \"constraints\": cloth vertices on colliders (its memory is contact's)";
             effects.on("contact constraints", why, bodies.cloth_vertices, 0);
         }
     }
@@ -340,12 +341,16 @@ fn plan_friction(effects: &mut Effects, scene: &Scene, contact: &Contact, stage:
 }
 
 /// The effect of limited edges.
-fn plan_strain(effects: &mut Effects, stage: Option<&ContactStage>) {
-    let edges = stage.map_or(0, |stage| stage.limited_edges);
-    if edges > 0 {
-        effects.on("strain limit", "cloth with strain_limit", edges, edges * size_of::<LimitedEdge>());
-    } else {
-        effects.off("strain limit", "no cloth has a strain_limit");
+fn plan_strain(effects: &mut Effects, scene: &Scene, stage: Option<&ContactStage>) {
+    match stage.filter(|stage| stage.limited_edges > 0) {
+        None => effects.off("strain limit", "no cloth has a strain_limit"),
+        Some(stage) if scene.contact.is_some() => {
+            let why = "cloth with strain_limit (its memory is contact's)";
+            effects.on("strain limit", why, stage.limited_edges, 0);
+        }
+        Some(stage) => {
+            effects.on("strain limit", "cloth with strain_limit", stage.limited_edges, stage.bytes())
+        }
     }
 }
 

@@ -155,8 +155,11 @@ pub struct EffectCost {
 /// The effect whose stages hold the time of the force models.
 const FORCES_WITHIN: &str = "integrator";
 
+/// Strain limits: in a scene without contact all that response takes is for them.
+const STRAIN: &str = "strain limit";
+
 /// The effect that a stage of the step is counted under: an effect of the stage's own name, or one of these.
-const STAGES: [(&str, &str); 11] = [
+const STAGES: [(&str, &str); 12] = [
     ("bending sub-steps", FORCES_WITHIN),
     ("forces", FORCES_WITHIN),
     ("linearise", FORCES_WITHIN),
@@ -168,6 +171,7 @@ const STAGES: [(&str, &str); 11] = [
     ("detection", "contact"),
     ("zones", "contact"),
     ("hold", "contact"),
+    ("strain", STRAIN),
 ];
 
 impl Report {
@@ -209,8 +213,10 @@ impl Report {
         for (name, seconds) in &step.seconds {
             add_seconds(&mut t.seconds, name, *seconds);
         }
+        let alone = !self.effects.iter().any(|e| e.name == "contact");
         for (stage, seconds) in &step.seconds {
             let name = STAGES.iter().find(|(known, _)| known == stage).map_or(stage.as_str(), |s| s.1);
+            let name = if alone && name == "contact" { STRAIN } else { name };
             add_milliseconds(&mut self.effects, name, 1e3 * seconds);
         }
         for (name, seconds) in &step.forces {

@@ -227,3 +227,88 @@ impl Scene {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = r#"
+duration = 1.0
+[contact]
+friction = 0.31
+self_friction = 0.21
+[[contact.pairs]]
+between = ["wall", "b"]
+friction = { law = "coulomb-stiction", mu_c = 0.32, mu_s = 0.4 }
+[[contact.pairs]]
+between = ["c", "c"]
+friction = 0.22
+[[contact.pairs]]
+between = ["a", "c"]
+friction = 0.23
+[[cloth]]
+name = "a"
+mesh = { generator = "disc", radius = 1.0, rings = 3 }
+material = "cotton"
+friction = 0.33
+[[cloth]]
+name = "b"
+mesh = { generator = "disc", radius = 1.0, rings = 3 }
+material = "cotton"
+friction = 0.34
+self_friction = { law = "coulomb-stiction", mu_c = 0.1, mu_s = 0.25 }
+[[cloth]]
+name = "c"
+mesh = { generator = "disc", radius = 1.0, rings = 3 }
+material = "cotton"
+self_friction = 0.24
+[[collider]]
+name = "wall"
+shape = { type = "box", half_extents = [1.0, 1.0, 1.0] }
+friction = 0.35
+[[collider]]
+name = "floor"
+shape = { type = "plane", half_size = 1.0 }
+"#;
+
+    #[test]
+    fn the_most_specific_entry_counts() {
+        let scene = Scene::parse_toml(SCENE, "test.toml").unwrap();
+        let contact = scene.contact.as_ref().unwrap();
+        let (a, b, c, wall, floor) = (0, 1, 2, 3, 4);
+        for (pair, key, mu_c) in [
+            ((b, wall), "contact.pairs[0].friction", 0.32),
+            ((a, wall), "collider[0].friction", 0.35),
+            ((c, wall), "collider[0].friction", 0.35),
+            ((a, floor), "cloth[0].friction", 0.33),
+            ((b, floor), "cloth[1].friction", 0.34),
+            ((c, floor), "contact.friction", 0.31),
+            ((a, a), "contact.self_friction", 0.21),
+            ((b, b), "cloth[1].self_friction", 0.1),
+            ((c, c), "contact.pairs[1].friction", 0.22),
+            // The smoother at rest, 0.21 of a and 0.24 of c, against the 0.25 of b.
+            ((a, b), "contact.self_friction", 0.21),
+            ((b, c), "cloth[2].self_friction", 0.24),
+            ((a, c), "contact.pairs[2].friction", 0.23),
+        ] {
+            for (i, j) in [pair, (pair.1, pair.0)] {
+                assert_eq!(scene.friction_entry(contact, i, j).0, key, "{i} {j}");
+                assert_eq!(scene.friction_law(contact, i, j).kinetic_coefficient(), mu_c, "{i} {j}");
+            }
+        }
+        assert_eq!(scene.friction_law(contact, b, wall).static_coefficient(), 0.4);
+        assert_eq!(scene.friction_law(contact, wall, floor).static_coefficient(), 0.0);
+    }
+
+    #[test]
+    fn of_equal_cloth_the_smoother_in_motion_counts_then_the_first() {
+        let text = SCENE.replace("self_friction = 0.24", "self_friction = 0.25");
+        let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+        let contact = scene.contact.as_ref().unwrap();
+        assert_eq!(scene.friction_entry(contact, 1, 2).0, "cloth[1].self_friction");
+        let same = "self_friction = { law = \"coulomb-stiction\", mu_c = 0.1, mu_s = 0.25 }";
+        let scene = Scene::parse_toml(&SCENE.replace("self_friction = 0.24", same), "test.toml").unwrap();
+        let contact = scene.contact.as_ref().unwrap();
+        assert_eq!(scene.friction_entry(contact, 1, 2).0, "cloth[1].self_friction");
+    }
+}
