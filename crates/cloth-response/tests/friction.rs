@@ -31,19 +31,15 @@ fn laws() -> [FrictionLaw; 4] {
 }
 
 fn params(law: FrictionLaw) -> ResponseParams {
-    ResponseParams {
-        thickness: THICKNESS,
-        friction: FrictionRule::uniform(law),
-        ..ResponseParams::default()
-    }
+    ResponseParams { thickness: THICKNESS, friction: FrictionRule::uniform(law), ..ResponseParams::default() }
 }
 
-/// A card of 10 × 10 cm with n × n vertices at its rest gap on a plane of 12 m with m × m vertices, all turned by `slope`
-/// [rad] about z.
-fn card_on_slope(n: usize, m: usize, slope: f64, law: FrictionLaw) -> World {
+/// A card of 10 × 10 cm with n × n vertices at its rest gap on a plane of the given side [m] with m × m vertices, all turned
+/// by `slope` [rad] about z.
+fn card_on_slope(n: usize, (side, m): (f64, usize), slope: f64, law: FrictionLaw) -> World {
     let turn = [0.0, 0.0, slope];
     let card = placed(grid(0.1, 0.1, n, n).unwrap(), [0.0, 0.3, 0.0], [0.0, THICKNESS, 0.0]);
-    let plane = placed(grid(12.0, 12.0, m, m).unwrap(), [0.0; 3], [0.013, 0.0, 0.017]);
+    let plane = placed(grid(side, side, m, m).unwrap(), [0.0; 3], [0.013, 0.0, 0.017]);
     World::new(&[cloth(placed(card, turn, [0.0; 3])), collider(placed(plane, turn, [0.0; 3]))], params(law))
 }
 
@@ -86,14 +82,18 @@ fn a_card_slides_as_its_equation_says() {
     for law in laws() {
         let exact = slid(law, slope, 2.0);
         for dt in [0.001, 0.004] {
-            for (n, m) in [(5, 2), (8, 2)] {
-                let mut world = card_on_slope(n, m, slope, law);
+            for (n, m) in [(5, 2), (8, 9)] {
+                let mut world = card_on_slope(n, (12.0, m), slope, law);
                 let start = centre(&world, 0);
                 for _ in 0..(2.0 / dt) as usize {
                     world.try_step(dt, &|_, x, _| *x).unwrap();
                 }
                 let way = (centre(&world, 0) - start).norm();
-                println!("{} dt {dt} n {n} m {m}: {way} exact {exact} error {:.2e}", law.name(), way / exact - 1.0);
+                println!(
+                    "{} dt {dt} n {n} m {m}: {way} exact {exact} error {:.2e}",
+                    law.name(),
+                    way / exact - 1.0
+                );
                 found.push((law, exact, way));
             }
         }
@@ -109,9 +109,9 @@ fn a_card_slides_as_its_equation_says() {
 #[test]
 fn a_card_rests_for_a_minute() {
     for law in laws() {
-        for m in [2, 242] {
+        for m in [2, 25] {
             let slope = (0.95 * law.static_coefficient()).atan();
-            let mut world = card_on_slope(6, m, slope, law);
+            let mut world = card_on_slope(6, (1.2, m), slope, law);
             let start = world.x.clone();
             let dt = 0.01;
             for _ in 0..6000 {
