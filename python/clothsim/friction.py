@@ -176,7 +176,7 @@ class Coefficient:
     value : float
         The coefficient [-].
     kind : {"published", "second-hand", "estimate"}
-        Read where it was published; attributed to a publication by someone else; not measured on this pair.
+        Read where it was published; attributed to a publication, but not read there; not measured on this pair.
     source : str
         Key of the reference, as in ``REFERENCES.bib``; empty for an estimate.
     note : str

@@ -321,3 +321,15 @@ def test_bad_pairs_are_named(contact: dict[str, Any], key: str, words: str) -> N
     with pytest.raises(cs.InvalidScene) as caught:
         scene(**contact)
     assert caught.value.key == key and words in str(caught.value), caught.value
+
+
+def test_the_page_lists_every_pair() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "friction.md").read_text()
+    marks = {"published": "{}", "second-hand": "{}*", "estimate": "~{}"}
+    for name, pair in cs.friction.pairs.items():
+        static, kinetic = (marks[c.kind].format(f"{c.value:.4g}") for c in (pair.static, pair.kinetic))
+        assert f"| `{name}` | {pair.about} | {static} | {kinetic} | {pair.static.source or pair.static.note}" in page, (
+            name
+        )
+    for key, about in cs.friction.pairs.sources().items():
+        assert f"- **{key}**: {about}" in page

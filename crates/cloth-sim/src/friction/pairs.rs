@@ -16,7 +16,7 @@ pub enum Source {
         /// Where in the reference.
         at: &'static str,
     },
-    /// Attributed to a publication by someone else.
+    /// Attributed to a publication, but not read there.
     SecondHand {
         /// Key of the reference, one of [`SOURCES`].
         key: &'static str,
@@ -85,8 +85,8 @@ pub const SOURCES: [Reference; 4] = [
     },
     Reference {
         key: "morton2008",
-        about: "Morton, Hearle 2008, Physical Properties of Textile Fibres, chapter 25. Not read itself: a transcription in \
-                a lecture script, which does not name where its numbers are from. Fibres on fibres, not fabrics.",
+        about: "Morton, Hearle 2008, Physical Properties of Textile Fibres, chapter 25. Attributed to it from memory and not \
+                checked: the numbers were read in a lecture script that names no source. Fibres on fibres, not fabrics.",
     },
     Reference {
         key: "temel2022",
@@ -100,7 +100,7 @@ const LAMSAL: &str = "lamsal2024";
 const COTTENDEN: &str = "cottenden2008";
 const MORTON: &str = "morton2008";
 
-const SCRIPT: &str = "chapter 25, through a transcription in a lecture script";
+const SCRIPT: &str = "chapter 25, attributed: read in a lecture script that names no source";
 const PRESETS: &str = "what presets of public cloth simulators take; not measured";
 const RATIO: &str = "1.2 times the kinetic one, as cotton on the forearm [temel2022]";
 const FOUR_FIFTHS: &str = "four fifths of the static one, as cotton on the forearm [temel2022]";
