@@ -66,7 +66,7 @@ impl Hit {
         };
         let (x_t0, x_t1) = (motion.x_t0, &motion.buffers.end);
         let stencil = at_contact(mesh, self.pair, self.time, x_t0, x_t1);
-        let gap = rest_gap(&stencil, mesh, params.thickness, rest_x);
+        let gap = rest_gap(&stencil, mesh, params, rest_x);
         let start: Vec3 = (0..4).map(|k| x_t0[stencil.vertices[k] as usize] * stencil.weights[k]).sum();
         let gap_t0 = stencil.normal.dot(&start);
         let gap_t1 = gap_t0.clamp(LEAST_GAP * gap, gap);

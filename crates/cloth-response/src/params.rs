@@ -21,6 +21,9 @@ pub struct ResponseParams {
     pub max_sweeps: usize,
     /// A contact whose relative velocity is off by less than this is left alone [m/s], > 0.
     pub velocity_tolerance: f64,
+    /// Cloth vertices carry on colliders, held by something else: edges and vertices of colliders rest on cloth only at half of
+    /// the thickness, so that they stay idle where surfaces are nearly flat.
+    pub vertices_carry: bool,
     /// Pairs in contact already at `x_t0` are exempt from acceptance and counted. Without this they make the step
     /// [`ResponseError::Unresolved`].
     pub allow_initial_contacts: bool,
@@ -36,6 +39,7 @@ impl Default for ResponseParams {
             max_zone_passes: 8,
             max_sweeps: 15,
             velocity_tolerance: 1e-6,
+            vertices_carry: false,
             allow_initial_contacts: false,
         }
     }

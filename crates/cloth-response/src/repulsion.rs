@@ -28,6 +28,8 @@ use cloth_collision::{CollisionMesh, Stencil, StencilKind};
 pub(crate) const BAND: f64 = 1.25;
 /// Rest gap of two edges as a fraction of the thickness.
 pub(crate) const EDGE_GAP: f64 = 0.75;
+/// Rest gap of what does not carry where [`ResponseParams::vertices_carry`], as a fraction of the thickness.
+const CARRIED_GAP: f64 = 0.5;
 /// Pairs of one cloth rest at no more than this fraction of their distance in the undeformed shape.
 const REST_FRACTION: f64 = 0.5;
 /// The fraction of the overlap that one step may undo (3.36).
@@ -36,9 +38,20 @@ const PUSH_FRACTION: f64 = 0.1;
 /// The pair's rest gap [m].
 ///
 /// `rest_x`: undeformed positions, or empty.
-pub(crate) fn rest_gap(stencil: &Stencil, mesh: &CollisionMesh, thickness: f64, rest_x: &[Vec3]) -> f64 {
-    let mut gap = thickness;
+pub(crate) fn rest_gap(
+    stencil: &Stencil,
+    mesh: &CollisionMesh,
+    params: &ResponseParams,
+    rest_x: &[Vec3],
+) -> f64 {
+    let mut gap = params.thickness;
     let body = |k: usize| mesh.vertex_body[stencil.vertices[k] as usize];
+    if params.vertices_carry {
+        let [first, second] = [0, 3].map(|k| mesh.bodies[body(k) as usize].dynamic);
+        if first != second && !(first && stencil.kind == StencilKind::VertexTriangle) {
+            return CARRIED_GAP * gap;
+        }
+    }
     if !rest_x.is_empty() && body(0) == body(3) {
         let apart: Vec3 = (0..4).map(|k| rest_x[stencil.vertices[k] as usize] * stencil.weights[k]).sum();
         gap = gap.min(REST_FRACTION * apart.norm());
@@ -72,7 +85,7 @@ pub(crate) fn contact<K: Kernel>(
     kernel: &K,
 ) -> Option<Contact<K::State>> {
     let stencil = &landed.start;
-    let gap = rest_gap(stencil, mesh, params.thickness, rest_x);
+    let gap = rest_gap(stencil, mesh, params, rest_x);
     let gap_t0 = stencil.distance;
     if gap_t0 > BAND * gap {
         return None;

@@ -63,6 +63,7 @@ impl ContactStage {
             friction,
             max_passes: contact.max_passes,
             max_zone_passes: contact.max_zone_passes,
+            vertices_carry: constraints.is_some(),
             allow_initial_contacts: allow,
             ..ResponseParams::default()
         };
