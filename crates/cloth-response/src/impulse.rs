@@ -99,12 +99,15 @@ impl<S: Copy> Contact<S> {
         (change, change.norm() / self.mass)
     }
 
-    /// Applies a change of the impulse.
-    pub(crate) fn apply(&mut self, change: Vec3, velocity: &mut [Vec3]) {
+    /// Applies a change of the impulse; `moved` hears of each vertex whose velocity changes.
+    #[inline]
+    pub(crate) fn apply(&mut self, change: Vec3, velocity: &mut [Vec3], mut moved: impl FnMut(usize)) {
         self.impulse += change;
         for k in 0..4 {
             if self.share[k] != 0.0 {
-                velocity[self.vertices[k] as usize] += change * self.share[k];
+                let v = self.vertices[k] as usize;
+                velocity[v] += change * self.share[k];
+                moved(v);
             }
         }
     }
@@ -164,7 +167,7 @@ mod tests {
     ) -> Contact<f64> {
         let mut contact = Contact::new(stencil, &inv_mass, law, mu).expect("a free vertex");
         let (change, _) = contact.correction(&Coulomb::default(), velocity);
-        contact.apply(change, velocity);
+        contact.apply(change, velocity, |_| ());
         contact
     }
 

@@ -134,14 +134,8 @@ impl<K: Kernel> ContactSet<K> {
             budget = budget.saturating_sub(sweep.looks);
             let spent = budget == 0 || info.sweeps >= CHEAP_SWEEPS * max_sweeps;
             if sweep.residual <= tolerance || spent {
-                let looks = &mut self.looks;
-                let mut changed = false;
-                self.kernel.settled(&mut self.contacts, motion, tolerance, |i| {
-                    looks[i].1 = 0;
-                    changed = true;
-                });
                 rounds += 1;
-                if !changed || rounds > MAX_ROUNDS || (spent && rounds > 1) {
+                if !self.settled(motion, tolerance) || rounds > MAX_ROUNDS || (spent && rounds > 1) {
                     break;
                 }
                 // What has let go needs looks of its own.
@@ -158,18 +152,32 @@ impl<K: Kernel> ContactSet<K> {
         info
     }
 
+    /// Lets friction see where the sweeps have settled; whether a contact has to be looked at again.
+    #[inline(never)]
+    fn settled(&mut self, motion: &Motion<'_>, tolerance: f64) -> bool {
+        let Self { kernel, contacts, looks, .. } = self;
+        let mut changed = false;
+        kernel.settled(contacts, motion, tolerance, |i| {
+            looks[i].1 = 0;
+            changed = true;
+        });
+        changed
+    }
+
     /// Moves the impulses by `beta` times the direction and renews it.
     fn follow(&mut self, beta: Option<f64>, motion: &mut Motion<'_>, tolerance: f64) {
         let Some(beta) = beta else {
-            self.direction.fill(Vec3::zeros());
-            self.change.fill(Vec3::zeros());
+            for (direction, change) in self.direction.iter_mut().zip(&mut self.change) {
+                (*direction, *change) = (Vec3::zeros(), Vec3::zeros());
+            }
             return;
         };
         for i in 0..self.contacts.len() {
             let step = self.direction[i] * beta;
             self.direction[i] = step + std::mem::take(&mut self.change[i]);
-            if step.norm() > tolerance * self.contacts[i].mass {
-                self.move_impulse(i, step, motion);
+            let contact = &mut self.contacts[i];
+            if step.norm() > tolerance * contact.mass {
+                move_impulse(contact, step, motion);
                 // Its own law is off now.
                 self.looks[i].1 = 0;
             }
@@ -182,27 +190,24 @@ impl<K: Kernel> ContactSet<K> {
         if seen > 0 && latest <= Some(seen) {
             return;
         }
-        let (change, error) = self.contacts[i].correction(&self.kernel, &motion.buffers.velocity);
+        let contact = &mut self.contacts[i];
+        let (change, error) = contact.correction(&self.kernel, &motion.buffers.velocity);
         sweep.looks += 1;
         sweep.residual = sweep.residual.max(error);
         if error > tolerance {
-            sweep.norm += error * error * self.contacts[i].mass;
+            sweep.norm += error * error * contact.mass;
             self.change[i] = change;
-            self.move_impulse(i, change, motion);
+            move_impulse(contact, change, motion);
         }
         self.looks[i].1 = motion.tick();
     }
+}
 
-    fn move_impulse(&mut self, i: usize, change: Vec3, motion: &mut Motion<'_>) {
-        let tick = motion.tick();
-        let contact = &mut self.contacts[i];
-        contact.apply(change, &mut motion.buffers.velocity);
-        for k in 0..4 {
-            if contact.moves(k) {
-                motion.buffers.touched[contact.vertices[k] as usize] = tick;
-            }
-        }
-    }
+#[inline]
+fn move_impulse<S: Copy>(contact: &mut Contact<S>, change: Vec3, motion: &mut Motion<'_>) {
+    let tick = motion.tick();
+    let touched = &mut motion.buffers.touched;
+    contact.apply(change, &mut motion.buffers.velocity, |v| touched[v] = tick);
 }
 
 /// What one sweep met.
