@@ -156,6 +156,8 @@ def test_pairs_have_values_and_sources() -> None:
     assert cs.friction.force("coulomb-stiction", 2.0, 1.0, **skin.coefficients) == -2.0 * skin.kinetic.value
 
 
+STICKY = {"law": "coulomb-stiction", "mu_c": 0.1, "mu_s": 0.3}
+
 # In scenes -----------------------------------------------------------------------------------------------------------
 
 CONTACT = {
@@ -237,6 +239,28 @@ def test_the_report_counts_what_sticks_and_slides() -> None:
     stuck, slid = counts(0.3), counts({"law": "coulomb-stiction", "mu_c": 0.05, "mu_s": 0.1})
     assert stuck[0] > 0 and stuck[1] == 0
     assert slid[0] == 0 and slid[1] > 0
+
+
+def test_the_contact_method_is_a_choice_of_the_scene() -> None:
+    def card(**keys: Any) -> cs.Scene:
+        return cs.Scene(
+            contact={"thickness": 0.004, "friction": STICKY, "method": "constraints"}, cloth=[sheet("card", 0.004)],
+            collider=[{"name": "table", "shape": {"type": "plane", "half_size": 1.0}}], gravity=[1.96, -9.81, 0.0],
+            **keys,
+        )  # fmt: skip
+
+    sim = cs.Simulation(card(time={"dt": 0.005}))
+    effects = {e["name"]: e for e in sim.plan["effects"]}
+    assert effects["contact constraints"]["on"] and effects["friction coulomb-stiction"]["on"]
+    before = sim.positions
+    for _ in range(20):
+        sim.step()
+    assert np.abs(sim.positions - before)[:, [0, 2]].max() < 1e-6, "it sticks: 1.96 < 0.3 · 9.81"
+    weight = sim.masses.sum() * np.array([1.96, -9.81, 0.0])
+    np.testing.assert_allclose(sim.contact_forces.sum(axis=0), -weight, atol=1e-3 * np.linalg.norm(weight))
+    with pytest.raises(cs.InvalidScene, match="contact.method") as caught:
+        card(time={"integrator": "rk4"})
+    assert caught.value.key == "contact.method"
 
 
 def test_set_friction_adds_and_replaces() -> None:

@@ -349,7 +349,7 @@ fn plan_strain(effects: &mut Effects, scene: &Scene, stage: Option<&ContactStage
             effects.on("strain limit", why, stage.limited_edges, 0);
         }
         Some(stage) => {
-            effects.on("strain limit", "cloth with strain_limit", stage.limited_edges, stage.bytes())
+            effects.on("strain limit", "cloth with strain_limit", stage.limited_edges, stage.bytes());
         }
     }
 }
