@@ -257,7 +257,7 @@ def test_the_contact_method_is_a_choice_of_the_scene() -> None:
         sim.step()
     assert np.abs(sim.positions - before)[:, [0, 2]].max() < 1e-6, "it sticks: 1.96 < 0.3 · 9.81"
     weight = sim.masses.sum() * np.array([1.96, -9.81, 0.0])
-    np.testing.assert_allclose(sim.contact_forces.sum(axis=0), -weight, atol=1e-3 * np.linalg.norm(weight))
+    np.testing.assert_allclose(sim.contact_forces.sum(axis=0), -weight, atol=1e-3 * float(np.linalg.norm(weight)))
     with pytest.raises(cs.InvalidScene, match="contact.method") as caught:
         card(time={"integrator": "rk4"})
     assert caught.value.key == "contact.method"

@@ -75,7 +75,7 @@ pub(crate) fn friction_pairs() -> String {
             "name": p.name, "about": p.about, "static": coefficient(&p.fixed), "kinetic": coefficient(&p.kinetic),
         })
     };
-    serde_json::Value::from_iter(pairs::pairs().iter().map(pair)).to_string()
+    pairs::pairs().iter().map(pair).collect::<serde_json::Value>().to_string()
 }
 
 /// References of the published pairs: key, and what it is.
