@@ -13,6 +13,7 @@ Examples
 
 from __future__ import annotations
 
+import difflib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -266,7 +267,12 @@ class Pairs(Mapping[str, Pair]):
         return dict(_core.friction_sources())
 
     def __getitem__(self, name: str) -> Pair:
-        return self._pairs[name]
+        try:
+            return self._pairs[name]
+        except KeyError as error:
+            near = difflib.get_close_matches(str(name), self._pairs, 1)
+            hint = f' (did you mean "{near[0]}"?)' if near else ""
+            raise KeyError(f"expected one of {', '.join(self._pairs)}, got {name!r}{hint}") from error
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._pairs)

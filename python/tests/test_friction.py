@@ -150,8 +150,9 @@ def test_pairs_have_values_and_sources() -> None:
             if coefficient.source:
                 assert coefficient.source in sources and f"{{{coefficient.source}," in bibliography
     assert kinds == {"published", "second-hand", "estimate"}
-    with pytest.raises(KeyError):
-        pairs["cotton"]
+    with pytest.raises(KeyError, match='did you mean "cotton-cotton"'):
+        pairs["coton-cotton"]
+    assert "cotton" not in pairs and pairs.get("cotton") is None
     skin = pairs["cotton-skin-forearm"]
     assert cs.friction.force("coulomb-stiction", 2.0, 1.0, **skin.coefficients) == -2.0 * skin.kinetic.value
 
@@ -294,6 +295,9 @@ def test_set_friction_adds_and_replaces() -> None:
         ('friction = { law = "coulomb", mu_c = 0.2, v_s = 0.1 }', "friction.v_s", "reads mu_c"),
         ('friction = { law = "stribeck", mu_c = 0.1, mu_s = 0.2, v_s = 0, delta_s = 0.2 }', "friction.v_s", "> 0 m/s"),
         ('friction = { law = "stribeck", mu_c = 0.1, mu_s = 0.2, v_s = 1, delta_s = 3 }', "friction.delta_s", "(0, 2]"),
+        ('friction = { law = "stribeck", mu_c = 0.1, mu_s = 0.2, v_s = 1e9, delta_s = 1 }', "friction.v_s", "1e5 m/s"),
+        ('friction = { law = "coulomb", mu_c = 1e300 }', "friction.mu_c", "at most 1e6"),
+        ("strain_limit = 1e-30", "strain_limit", "at least 1e-9"),
         ('friction = { pair = "cotton-coton" }', "friction.pair", 'did you mean "cotton-cotton"'),
         ('friction = { pair = "cotton-cotton", mu_s = 0.3 }', "friction.mu_s", "no value beside pair"),
         ("strain_limit = 0", "strain_limit", "> 0, got 0"),
