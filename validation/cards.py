@@ -130,10 +130,13 @@ def plot(jobs: list[tuple[str, str, float, str, str]], slides: list[Slide], path
     axes[1].set(xlabel="t [s]", ylabel="speed [m/s]", title="speed")
     axes[2].set(xlabel="t [s]", ylabel="friction / normal force", title="friction", ylim=(0.05, 0.25))
     axes[0].legend()
-    for k, (job, found) in enumerate(zip(jobs, slides, strict=True)):
+    for job, found in zip(jobs, slides, strict=True):
         error = 100.0 * (found.way[-1] / target(LAWS[job[0]]) - 1.0)
-        axes[3].plot(k, error, "os"[METHODS.index(job[1])], color={1e-3: "C0", 4e-3: "C3"}.get(job[2], "C7"), ms=4)
+        side = METHODS.index(job[1])
+        place = list(LAWS).index(job[0]) + 0.2 * (side - 0.5)
+        axes[3].plot(place, error, "os"[side], color={1e-3: "C0", 4e-3: "C3"}.get(job[2], "C7"), ms=5, mfc="none")
     axes[3].axhspan(-BOUND, BOUND, color="0.93")
-    axes[3].set(xlabel="run", title="way after 2 s\n(blue 1 ms, red 4 ms; square: constraints)", ylabel="deviation [%]")
+    axes[3].set(title="way after 2 s: 1 ms blue, 4 ms red\n(square: constraints)", ylabel="deviation [%]")
+    axes[3].set_xticks(range(len(LAWS)), list(LAWS))
     figure.savefig(path, dpi=90)
     plt.close(figure)

@@ -53,6 +53,12 @@ def rows() -> list[tuple[object, ...]]:
         for wrap in capstan.WRAPS:
             ratio = sliding.capstan(mu, float(np.radians(wrap)))
             add("capstan", f"mu {mu:g}, {wrap:g} degrees", "ratio of tensions", "-", ratio, formula, EULER)
+    for name, law in capstan.LAWS.items():
+        case = capstan.Case(law, 180.0, "")
+        if name != "C":
+            text = f"{name} sliding with {capstan.SPEED:g} m/s, mu {case.mu:.4g}, 180 degrees"
+            note = f"{_parameters(law)}; T + f_v V R/mu instead of T" if law.f_v else _parameters(law)
+            add("capstan", text, "ratio of tensions", "-", sliding.capstan(case.mu, np.pi), formula, EULER, note)
     return out
 
 
