@@ -16,6 +16,9 @@ const LEAST_AGREEMENT: f64 = 0.5;
 /// A triangle is nearer than another by at least this fraction of the squared distance: above its rounding error, so that
 /// no pair goes back and forth between triangles that share the closest point.
 const NEARER: f64 = 1e-9;
+/// A point with a weight below this lies on the side opposite: it is found on it from the triangle there too, and rounding
+/// must not make two contacts of it.
+const ON_SIDE: f64 = 1e-9;
 /// Triangles that a pair may cross in one step; a pair that crosses more is left to the continuous detection.
 const MAX_CROSSED: usize = 64;
 
@@ -159,7 +162,9 @@ impl Landing {
 /// The pair, the weights of its closest points and their squared distance.
 fn closest(vertices: [u32; 4], x: &[Vec3]) -> ([u32; 4], [f64; 4], f64) {
     let p = vertices.map(|v| x[v as usize]);
-    let w = vertex_triangle::closest_point(&p);
+    let mut w = vertex_triangle::closest_point(&p).map(|w| if w < ON_SIDE { 0.0 } else { w });
+    let sum: f64 = w.iter().sum();
+    w.iter_mut().for_each(|w| *w /= sum);
     let weights = [1.0, -w[0], -w[1], -w[2]];
     (vertices, weights, separation(&p, &weights).norm_squared())
 }
@@ -218,10 +223,15 @@ mod tests {
             let mut landed = vec![];
             let x = self.with_point(to);
             Landing::new(&self.mesh).follow(&self.near(from, band), &self.mesh, &x, |l| landed.push(l));
-            // On a side itself two triangles have the same closest point, which later stages take once.
-            let point =
-                |l: &Landed| l.end.map(|e| separation(&e.vertices.map(|v| x[v as usize]), &e.weights));
-            landed.dedup_by_key(|l| point(l));
+            // Closest points on one side or corner are taken once, as the contacts of a step are.
+            let feature = |l: &Landed| {
+                let end = l.end?;
+                let mut key =
+                    [0, 1, 2, 3].map(|k| if end.weights[k] == 0.0 { u32::MAX } else { end.vertices[k] });
+                key.sort_unstable();
+                Some(key)
+            };
+            landed.dedup_by_key(|l| feature(l));
             landed
         }
     }
@@ -259,6 +269,18 @@ mod tests {
         let r = separation(&start.vertices.map(|v| x[v as usize]), &weights);
         assert!(weights.contains(&0.0) && r.normalize().x > 0.5, "{r:?}");
         assert_eq!(ground.land(from, to, 0.1001)[0].end.unwrap().normal, Vec3::y());
+    }
+
+    /// Straight above a side, up to rounding to either hand, both triangles find the same point on it.
+    #[test]
+    fn above_a_side_is_one_contact() {
+        let ground = Ground::new(0.0);
+        for off in [-1e-15, -1e-17, 0.0, 1e-17, 1e-15] {
+            let p = Vec3::new(0.3 + off, 0.1, 0.3 - off);
+            let features = |l: &Landed| l.end.map(|e| e.weights.iter().filter(|w| **w == 0.0).count());
+            let landed = ground.land(p, p, 0.125);
+            assert_eq!(landed.iter().map(features).collect::<Vec<_>>(), [Some(1)], "{off} {landed:?}");
+        }
     }
 
     /// Over a ridge the pair goes on to the falling side, with that side's normal; at the ridge itself the normal lies
