@@ -123,3 +123,188 @@ fn a_card_rests_for_a_minute() {
         }
     }
 }
+
+/// Laws with a static threshold hold up to it, and slide beyond it, on planes of few and of many vertices.
+#[test]
+fn sliding_starts_at_the_static_coefficient() {
+    /// Half of what half a degree changes in the slope.
+    const STEP: f64 = 0.004;
+    for law in laws() {
+        for m in [2, 25] {
+            let moves = |slope: f64| {
+                let mut world = card_on_slope(6, (1.2, m), slope.atan(), law);
+                let start = centre(&world, 0);
+                for _ in 0..50 {
+                    world.try_step(0.004, &|_, x, _| *x).unwrap();
+                }
+                (centre(&world, 0) - start).norm()
+            };
+            let mu_s = law.static_coefficient();
+            assert!(moves(mu_s - STEP) < DRIFT, "{} holds", law.name());
+            let free = 0.5 * GRAVITY * STEP * 0.2 * 0.2;
+            assert!(moves(mu_s + STEP) > 0.9 * free, "{} slides", law.name());
+        }
+    }
+}
+
+/// A card on a level plane that moves at 0.5 m/s is taken along: it gains μ g t until it rests on the plane.
+#[test]
+fn a_moving_surface_drags() {
+    let speed = Vec3::new(0.5, 0.0, 0.2);
+    let dt = 0.004;
+    for law in laws() {
+        let mut world = card_on_slope(5, (4.0, 2), 0.0, law);
+        let still = Vec3::zeros();
+        for step in 0..400 {
+            world.try_step(dt, &|_, x, _| x + speed * dt).unwrap();
+            let v = world.v[0];
+            if step == 24 {
+                let pull = law.kinetic_force(GRAVITY, speed.norm(), 1.0 / AREAL_DENSITY);
+                assert!(
+                    v.dot(&speed.normalize()) > 0.8 * (law.kinetic_coefficient() * GRAVITY * 0.1),
+                    "{v:?}"
+                );
+                assert!(v.norm() < 1.2 * (pull + 0.1 * GRAVITY) * 0.1 && v != still, "{v:?}");
+            }
+        }
+        for i in world.body(0) {
+            assert!((world.v[i] - speed).norm() < 1e-9, "{}: {:?}", law.name(), world.v[i]);
+        }
+    }
+}
+
+/// Speed after `steps` steps of a card that starts at 1 m/s on level ground, per step.
+fn coast(mut world: World, dt: f64, steps: usize) -> Vec<f64> {
+    for i in world.body(0) {
+        world.v[i].x = 1.0;
+    }
+    let mut speeds = Vec::new();
+    for _ in 0..steps {
+        world.try_step(dt, &|_, x, _| *x).unwrap();
+        let mass: f64 = world.body(0).map(|i| 1.0 / world.inv_mass[i]).sum();
+        speeds.push(world.body(0).map(|i| world.v[i].x / world.inv_mass[i]).sum::<f64>() / mass);
+    }
+    speeds
+}
+
+/// Viscous friction brakes by area, whatever the meshes of either side: v falls by 1/(1 + dt f_v/ρ) in each step.
+#[test]
+fn viscosity_goes_by_area() {
+    let (dt, steps, rate) = (0.004, 50, 2.0);
+    let law = FrictionLaw::Viscous {
+        mu_c: 0.0,
+        mu_s: 0.0,
+        v_s: 1.0,
+        delta_s: 1.0,
+        f_v: rate * AREAL_DENSITY,
+        delta_v: 1.0,
+    };
+    let exact = (1.0 + rate * dt).powi(-(steps as i32));
+    // A card on a plane with few vertices, and on one with vertices under it: 1 cm apart, within 2 cm of the card's own.
+    let on_plane = |n: usize, m: usize| card_on_slope(n, (0.9, m), 0.0, law);
+    for (n, m, error) in [(5, 2, 1e-9), (9, 2, 1e-9), (6, 91, 0.02)] {
+        let end = *coast(on_plane(n, m), dt, steps).last().unwrap();
+        println!("{n} {m}: {end} {exact}");
+        assert!((end / exact - 1.0).abs() < error, "{n} × {n} on {m} × {m}: {end} against {exact}");
+    }
+    // On pinned cloth, which has an area of its own.
+    for n in [4, 11] {
+        let card = placed(grid(0.1, 0.1, 6, 6).unwrap(), [0.0; 3], [0.0, THICKNESS, 0.0]);
+        let sheet = placed(grid(0.6, 0.6, 3 * n, 3 * n).unwrap(), [0.0, 0.1, 0.0], [0.1, 0.0, 0.003]);
+        let mut world = World::new(&[cloth(card), cloth(sheet)], params(law));
+        world.body(1).for_each(|i| world.pin(i));
+        let end = *coast(world, dt, steps).last().unwrap();
+        println!("cloth {n}: {end} {exact}");
+        assert!((end / exact - 1.0).abs() < 0.9, "on cloth, {n}: {end} against {exact}");
+    }
+}
+
+/// However viscous, friction stops the motion and does not turn it round; an explicit drag would, at dt f_v/ρ > 1.
+#[test]
+fn friction_never_turns_the_motion() {
+    for (f_v, delta_v) in [(1e3, 1.0), (1e9, 1.0), (50.0, 0.5), (1e4, 2.0)] {
+        let law = FrictionLaw::Viscous { mu_c: 0.02, mu_s: 0.03, v_s: 0.1, delta_s: 0.2, f_v, delta_v };
+        let dt = 0.01;
+        assert!(dt * f_v / AREAL_DENSITY > 1.0, "a case that an explicit drag turns round");
+        let speeds = coast(card_on_slope(5, (2.0, 2), 0.0, law), dt, 200);
+        let mut last = 1.0;
+        for v in &speeds {
+            assert!((-1e-12..=last + 1e-12).contains(v), "{law:?}: {last} then {v}");
+            last = *v;
+        }
+        assert!(last < 1e-3, "{law:?}: {last}");
+    }
+}
+
+/// Two pieces of cloth that meet, slide and rub exchange momentum and make none, under every law.
+#[test]
+fn self_contact_keeps_momentum() {
+    /// Relative to the momentum of the upper piece.
+    const MOMENTUM_ERROR: f64 = 1e-10;
+    for law in laws() {
+        let mut world = World::new(
+            &[
+                cloth(placed(grid(0.1, 0.1, 5, 5).unwrap(), [0.1, 0.0, 0.05], [0.0, 0.02, 0.0])),
+                cloth(placed(grid(0.1, 0.1, 6, 6).unwrap(), [0.0, 0.3, 0.0], [0.01, 0.0, 0.0])),
+            ],
+            params(law),
+        );
+        world.gravity = Vec3::zeros();
+        for i in world.body(0) {
+            world.v[i] = Vec3::new(0.5, -2.0, 0.1);
+        }
+        let start = world.momentum().0;
+        let (mut contacts, mut sliding) = (0, 0);
+        for _ in 0..40 {
+            let info = world.step(0.005);
+            contacts += info.impulses;
+            sliding += info.sliding;
+            assert!(info.sliding + info.sticking <= info.impulses && info.held_vertices == 0);
+        }
+        assert!(contacts > 100 && sliding > 10, "{contacts} {sliding}");
+        let error = (world.momentum().0 - start).norm() / start.norm();
+        assert!(error < MOMENTUM_ERROR, "{}: {error:e}", law.name());
+        let along = world.body(1).map(|i| world.v[i].x / world.inv_mass[i]).sum::<f64>();
+        assert!(along > 1e-3 * start.norm(), "{}: friction pulls the lower piece along, {along}", law.name());
+    }
+}
+
+/// The kernel of all laws gives what Coulomb's gives where the law is the same.
+#[test]
+fn stiction_without_excess_is_coulomb() {
+    let run = |law: FrictionLaw| {
+        let mut world = card_on_slope(6, (3.0, 25), SLOPE.atan(), law);
+        for _ in 0..100 {
+            world.try_step(0.004, &|_, x, _| *x).unwrap();
+        }
+        world.x
+    };
+    let coulomb = run(FrictionLaw::Coulomb { mu_c: 0.1 });
+    let same = run(FrictionLaw::CoulombStiction { mu_c: 0.1, mu_s: 0.1 });
+    let other = run(FrictionLaw::CoulombStiction { mu_c: 0.11, mu_s: 0.11 });
+    let apart = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    assert!(apart(&coulomb, &same) < 1e-6, "{:e}", apart(&coulomb, &same));
+    assert!(apart(&coulomb, &other) > 1e-3);
+}
+
+/// The same bits with one thread and with three.
+#[test]
+fn threads_change_nothing() {
+    for law in laws() {
+        let run = |threads: usize| {
+            let parts = [
+                cloth(placed(grid(0.2, 0.2, 12, 12).unwrap(), [0.0, 0.2, 0.1], [0.0, 0.03, 0.0])),
+                cloth(placed(grid(0.2, 0.2, 11, 11).unwrap(), [0.0; 3], [0.01, 0.005, 0.0])),
+                collider(grid(1.0, 1.0, 9, 9).unwrap()),
+            ];
+            let mut world = World::with_threads(&parts, params(law), threads);
+            world.stiffness = 5.0;
+            world.damping = 1e-3;
+            for _ in 0..40 {
+                world.try_step(0.005, &|_, x, _| *x).unwrap();
+            }
+            (world.x, world.v)
+        };
+        assert!(run(1) == run(3), "{}", law.name());
+    }
+}

@@ -144,20 +144,6 @@ impl General {
         self.dt = dt;
     }
 
-    /// Area of a contact whose vertices are loaded with `load` [m²]: each side counts its vertices' areas by weight, a
-    /// vertex that several contacts load gives each its share, and of two sides of cloth the mean counts.
-    fn area(&self, contact: &Contact<Sliding>, load: impl Fn(usize) -> f64) -> f64 {
-        let (mut sides, mut cloth) = ([0.0; 2], [false; 2]);
-        for k in 0..4 {
-            let v = contact.vertices[k] as usize;
-            let (weight, area) = (contact.weights[k], self.areas[v]);
-            let side = usize::from(weight < 0.0);
-            sides[side] += weight.abs() * area / load(v).max(1.0);
-            cloth[side] |= area > 0.0;
-        }
-        (sides[0] + sides[1]) / if cloth[0] && cloth[1] { 2.0 } else { 1.0 }
-    }
-
     /// The speed s > 0 at which s + (λ μ(s) + A f_v dt s^δ_v)/m = u, the largest; 0 if there is none.
     fn speed(&self, state: &mut Sliding, lambda: f64, mass: f64, u: f64) -> f64 {
         if self.frozen && state.speed > 0.0 {
@@ -206,6 +192,23 @@ impl General {
     }
 }
 
+/// Area of a contact whose vertices are loaded with `load` [m²]: each side counts its vertices' areas by weight, a vertex that
+/// several contacts load gives each its share, and of two sides of cloth the mean counts.
+fn contact_area(areas: &[f64], contact: &Contact<Sliding>, load: impl Fn(usize) -> f64) -> f64 {
+    let (mut sides, mut cloth) = ([0.0; 2], [false; 2]);
+    for k in 0..4 {
+        let v = contact.vertices[k] as usize;
+        let (weight, area) = (contact.weights[k], areas[v]);
+        let side = usize::from(weight < 0.0);
+        sides[side] += weight.abs() * area / load(v).max(1.0);
+        cloth[side] |= weight != 0.0 && area > 0.0;
+    }
+    match cloth {
+        [true, true] => 0.5 * (sides[0] + sides[1]),
+        _ => sides[0] + sides[1],
+    }
+}
+
 impl Kernel for General {
     type State = Sliding;
 
@@ -244,18 +247,25 @@ impl Kernel for General {
     fn begin(&mut self, contacts: &mut [Contact<Sliding>], vertex_count: usize) {
         self.degree.clear();
         self.degree.resize(vertex_count, 0);
+        let (degree, areas) = (&mut self.degree, &self.areas);
+        // A pinned vertex moves nothing, but has an area to share.
+        let counts = |contact: &Contact<Sliding>, k: usize| {
+            let shares = contact.weights[k] != 0.0
+                && areas.get(contact.vertices[k] as usize).is_some_and(|area| *area > 0.0);
+            contact.moves(k) || shares
+        };
         let each = |contact: &Contact<Sliding>, f: &mut dyn FnMut(usize)| {
-            (0..4).filter(|&k| contact.moves(k)).for_each(|k| f(contact.vertices[k] as usize));
+            (0..4).filter(|&k| counts(contact, k)).for_each(|k| f(contact.vertices[k] as usize));
         };
         for contact in &*contacts {
-            each(contact, &mut |v| self.degree[v] += 1);
+            each(contact, &mut |v| degree[v] += 1);
         }
         for contact in contacts {
             let mut alone = true;
-            each(contact, &mut |v| alone &= self.degree[v] == 1);
+            each(contact, &mut |v| alone &= degree[v] == 1);
             contact.friction.alone = alone;
             if alone && self.viscous {
-                contact.friction.area = self.area(contact, |_| 1.0);
+                contact.friction.area = contact_area(areas, contact, |_| 1.0);
             }
         }
     }
@@ -300,7 +310,7 @@ impl Kernel for General {
                 contact.friction.broken = changed;
             }
             if self.viscous {
-                let area = self.area(contact, |v| self.load[v]);
+                let area = contact_area(&self.areas, contact, |v| self.load[v]);
                 changed |=
                     contact.friction.broken && (area - contact.friction.area).abs() > AREA_CHANGE * area;
                 contact.friction.area = area;
