@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import block, capstan, cards, sliding, slope
+from . import block, capstan, cards, carried, sliding, slope
 
-TESTS = {"cards": cards.run, "slope": slope.run, "block": block.run, "capstan": capstan.run}
+TESTS = {"cards": cards.run, "carried": carried.run, "slope": slope.run, "block": block.run, "capstan": capstan.run}
 
 LAW = "friction as in T. H. Wong 2014, Improvements to Physically Based Cloth Simulation (thesis), equations 7.1 to 7.7"
 CARD = (
@@ -16,6 +16,14 @@ CARD = (
 BLOCK = (
     f"m x'' = k (V t - x) - friction, with stick phases, solved in validation/sliding.py to 1e-10; {LAW}, parameters "
     "of table 7.1, stick-slip"
+)
+CONVEYOR = (
+    f"du/dt = -F_k(u)/m relative to the conveyor, until it stops, solved in validation/sliding.py to 1e-10; {LAW}, "
+    "parameters of table 7.1, card"
+)
+TURNTABLE = (
+    "(R A)^2 + (R w^2)^2 = (mu_s g)^2, A the table's angular acceleration; under Coulomb's law also the time until the "
+    "slip is seen (validation/carried.py)"
 )
 STICK_SLIP = "2 D/V + (2/w) (pi - atan(D w/V)), D = (mu_s - mu_c) m g/k, w = sqrt(k/m): from the same equation"
 ANGLE = "balance of forces on a slope: C. A. Coulomb 1785, Theorie des machines simples"
@@ -38,6 +46,10 @@ def rows() -> list[tuple[object, ...]]:
 
     for name, law in cards.LAWS.items():
         add("cards", name, "way in 2 s", "m", cards.target(law), solved, CARD, _parameters(law))
+    for name, law in carried.LAWS.items():
+        way = float(carried.solution(name).way[-1])
+        add("carried", name, "way on a conveyor", "m", way, solved, CONVEYOR, _parameters(law))
+        add("carried", name, "cast off by a turntable", "rad/s", carried.cast_off_speed(name), formula, TURNTABLE)
     for mu in slope.COEFFICIENTS:
         add("slope", f"mu_s {mu:g}", "angle", "degree", float(np.degrees(np.arctan(mu))), formula, ANGLE)
     add("slope", f"{slope.BELOW:g} degree below atan {slope.REST_MU:g}", "drift over 60 s", "m/s", 0.0, formula, REST)
