@@ -164,7 +164,9 @@ fn closest(vertices: [u32; 4], x: &[Vec3]) -> ([u32; 4], [f64; 4], f64) {
     let p = vertices.map(|v| x[v as usize]);
     let mut w = vertex_triangle::closest_point(&p).map(|w| if w < ON_SIDE { 0.0 } else { w });
     let sum: f64 = w.iter().sum();
-    w.iter_mut().for_each(|w| *w /= sum);
+    for w in &mut w {
+        *w /= sum;
+    }
     let weights = [1.0, -w[0], -w[1], -w[2]];
     (vertices, weights, separation(&p, &weights).norm_squared())
 }

@@ -89,11 +89,6 @@ fn a_card_slides_as_its_equation_says() {
                     world.try_step(dt, &|_, x, _| *x).unwrap();
                 }
                 let way = (centre(&world, 0) - start).norm();
-                println!(
-                    "{} dt {dt} n {n} m {m}: {way} exact {exact} error {:.2e}",
-                    law.name(),
-                    way / exact - 1.0
-                );
                 found.push((law, exact, way));
             }
         }
@@ -118,7 +113,6 @@ fn a_card_rests_for_a_minute() {
                 world.try_step(dt, &|_, x, _| *x).unwrap();
             }
             let drift = world.body(0).map(|i| (world.x[i] - start[i]).norm()).fold(0.0, f64::max) / 60.0;
-            println!("{} {m}: {drift:e} m/s", law.name());
             assert!(drift < DRIFT, "{}: {drift:e} m/s", law.name());
         }
     }
@@ -204,18 +198,19 @@ fn viscosity_goes_by_area() {
     let on_plane = |n: usize, m: usize| card_on_slope(n, (0.9, m), 0.0, law);
     for (n, m, error) in [(5, 2, 1e-9), (9, 2, 1e-9), (6, 91, 0.02)] {
         let end = *coast(on_plane(n, m), dt, steps).last().unwrap();
-        println!("{n} {m}: {end} {exact}");
         assert!((end / exact - 1.0).abs() < error, "{n} × {n} on {m} × {m}: {end} against {exact}");
     }
     // On pinned cloth, which has an area of its own.
-    for n in [4, 11] {
+    // Cells of 2 cm as the card's own, and of 5 cm, whose borders count too much.
+    for (n, error) in [(11, 0.01), (4, 0.15)] {
         let card = placed(grid(0.1, 0.1, 6, 6).unwrap(), [0.0; 3], [0.0, THICKNESS, 0.0]);
         let sheet = placed(grid(0.6, 0.6, 3 * n, 3 * n).unwrap(), [0.0, 0.1, 0.0], [0.1, 0.0, 0.003]);
         let mut world = World::new(&[cloth(card), cloth(sheet)], params(law));
-        world.body(1).for_each(|i| world.pin(i));
+        for i in world.body(1) {
+            world.pin(i);
+        }
         let end = *coast(world, dt, steps).last().unwrap();
-        println!("cloth {n}: {end} {exact}");
-        assert!((end / exact - 1.0).abs() < 0.9, "on cloth, {n}: {end} against {exact}");
+        assert!((end / exact - 1.0).abs() < error, "on cloth, {n}: {end} against {exact}");
     }
 }
 

@@ -129,7 +129,9 @@ impl General {
             if mesh.bodies[mesh.vertex_body[triangle[0] as usize] as usize].dynamic {
                 let [a, b, c] = triangle.map(|v| x[v as usize]);
                 let third = (b - a).cross(&(c - a)).norm() / 6.0;
-                triangle.iter().for_each(|&v| self.areas[v as usize] += third);
+                for &v in triangle {
+                    self.areas[v as usize] += third;
+                }
             }
         }
     }
@@ -193,7 +195,8 @@ impl General {
 }
 
 /// Area of a contact whose vertices are loaded with `load` [m²]: each side counts its vertices' areas by weight, a vertex that
-/// several contacts load gives each its share, and of two sides of cloth the mean counts.
+/// several contacts load gives each its share, and of two sides of cloth the harmonic mean counts: at a border the side with
+/// the larger cells counts too much.
 fn contact_area(areas: &[f64], contact: &Contact<Sliding>, load: impl Fn(usize) -> f64) -> f64 {
     let (mut sides, mut cloth) = ([0.0; 2], [false; 2]);
     for k in 0..4 {
@@ -204,7 +207,7 @@ fn contact_area(areas: &[f64], contact: &Contact<Sliding>, load: impl Fn(usize) 
         cloth[side] |= weight != 0.0 && area > 0.0;
     }
     match cloth {
-        [true, true] => 0.5 * (sides[0] + sides[1]),
+        [true, true] => 2.0 * sides[0] * sides[1] / (sides[0] + sides[1]),
         _ => sides[0] + sides[1],
     }
 }
