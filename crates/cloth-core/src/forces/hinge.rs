@@ -18,8 +18,9 @@
 //!
 //! Coupled hinges add E_c = Σ C_ij e_i e_j over the pairs of hinges of each triangle ([`Coupled`]), and its torque, with the
 //! elastic angles e = h̄ K_e, K_e what the law's elastic part B K_e sees (K less what a path has made of the rest angle).
-//! Friction and flow stay with each hinge. An evaluation then takes two passes: the angles of all hinges, then the forces.
-//! The tangent takes E_c by its bound.
+//! Friction and flow stay with each hinge: E_c is the energy of its torque but where the plastic law flows within a step, and a
+//! rest angle that moves takes its part of E_c along. An evaluation takes two passes: the angles of all hinges, then the forces. The
+//! tangent takes E_c by its bound.
 //!
 //! A triangle flatter than 10⁻⁴ of its rest area has its gradient scaled down to zero with its normal, so forces stay
 //! finite; there the force is no longer the exact gradient of E.
