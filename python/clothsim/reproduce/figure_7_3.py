@@ -29,6 +29,7 @@ THESIS = (
 COEFFICIENTS = TABLE_7_1["incline plane"]
 LAWS = ("C", "CSS")
 FPS = 50.0
+FINE = 40  # cells along a side, from which on folds are compared
 
 
 @dataclass(frozen=True)
@@ -143,7 +144,7 @@ def measure(effort: Effort) -> Measured:
     """Drop the cloth under both laws."""
     setup = Setup()
     if effort.quick:
-        setup = replace(setup, cells=28, dt=4e-3)
+        setup = replace(setup, cells=20, dt=4e-3)
     moments = [0.2, 0.4, 0.6, 0.9, 1.2, setup.duration]
     with effort.bar(round(setup.duration * FPS) * len(LAWS), "figure 7.3", "frame") as bar:
         found = effort.each(lambda law: _run(law, setup, moments, bar.update), LAWS, bar)
@@ -237,12 +238,14 @@ def checks(measured: Measured) -> Sequence[Check]:
     """The thesis's order."""
     coulomb, stribeck = (measured.runs[law] for law in LAWS)
     source = "thesis 7.5, figure 7.3"
-    folds = [float(run.folds[_landed(run)].mean()) for run in (coulomb, stribeck)]
-    return [
-        Check.true("CSS slides less far", stribeck.way[-1] < coulomb.way[-1], source),
-        Check.true("CSS slides slower", stribeck.speed[-1] < coulomb.speed[-1], source),
-        Check.true("CSS folds more", folds[1] > folds[0], source),
+    found = [
+        Check.true("CSS slides less far", bool(stribeck.way[-1] < coulomb.way[-1]), source),
+        Check.true("CSS slides slower", bool(stribeck.speed[-1] < coulomb.speed[-1]), source),
     ]
+    if measured.setup.cells >= FINE:  # folds of a coarse mesh are a matter of chance
+        folds = [float(run.folds[_landed(run)].mean()) for run in (coulomb, stribeck)]
+        found.append(Check.true("CSS folds more", folds[1] > folds[0], source))
+    return found
 
 
 def draw(measured: Measured) -> bytes:
