@@ -84,6 +84,15 @@ pub struct ContactReport {
     pub largest_stretch: f64,
     /// Largest compression 1 − l/l₀ of an edge whose compression is limited, after the step [-].
     pub largest_compression: f64,
+    /// Cloth vertices that constraints held on colliders so that they stuck.
+    #[serde(default)]
+    pub constrained_sticking: usize,
+    /// Cloth vertices that constraints held on colliders and that slid.
+    #[serde(default)]
+    pub constrained_sliding: usize,
+    /// Solves of the search for which stick and which slide.
+    #[serde(default)]
+    pub constraint_solves: usize,
 }
 
 impl ContactReport {
@@ -104,6 +113,18 @@ impl ContactReport {
         self.strain_passes += info.strain_passes;
         self.largest_stretch = self.largest_stretch.max(info.largest_stretch);
         self.largest_compression = self.largest_compression.max(info.largest_compression);
+    }
+
+    /// Adds what constraints did to vertices in the solves of one step.
+    pub(crate) fn add_constraints(&mut self, holds: &crate::constraints::Holds, solves: usize) {
+        for (force, sliding) in holds.force.iter().zip(&holds.sliding) {
+            if *sliding {
+                self.constrained_sliding += 1;
+            } else if *force != crate::Vec3::zeros() {
+                self.constrained_sticking += 1;
+            }
+        }
+        self.constraint_solves += solves;
     }
 }
 

@@ -122,12 +122,14 @@ impl Simulation {
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
         let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
-        let (dynamics, holds) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
+        let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let v_free = self.contact.is_some().then(|| v.clone());
         if let Some(info) = self.response(dt, &mut x, &mut v, report)? {
             self.check(&x, &v, report)?;
-            report.contact.get_or_insert_default().add(&info);
+            let contact = report.contact.get_or_insert_default();
+            contact.add(&info);
+            contact.add_constraints(&holds, solves);
         }
 
         report.newton_iterations += dynamics.newton_iterations;
@@ -173,7 +175,7 @@ impl Simulation {
         }
     }
 
-    /// The end of the step without contact but for constraints, and what those did.
+    /// The end of the step without contact but for constraints, what those did, and their solves.
     fn dynamics(
         &mut self,
         dt: f64,
@@ -182,15 +184,15 @@ impl Simulation {
         pin_x: &[Vec3],
         pin_v: &[Vec3],
         report: &mut StepReport,
-    ) -> Result<(StepInfo, Holds), Failure> {
-        let (info, holds) = match self.constrained_dynamics(dt, x, v, pin_x, pin_v, report)? {
+    ) -> Result<(StepInfo, Holds, usize), Failure> {
+        let (info, holds, solves) = match self.constrained_dynamics(dt, x, v, pin_x, pin_v, report)? {
             Some(done) => done,
             None => {
                 let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
                 self.expect_contact(dt, v);
                 let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?;
                 self.forget_contact(dt, x, v);
-                (info, Holds::default())
+                (info, Holds::default(), 0)
             }
         };
         for (name, seconds) in &info.seconds {
@@ -199,7 +201,7 @@ impl Simulation {
         for (name, seconds) in &info.forces {
             add_seconds(&mut report.forces, name, *seconds);
         }
-        Ok((info, holds))
+        Ok((info, holds, solves))
     }
 
     /// Makes the motion free of known collisions; `None` for a scene without contact.

@@ -24,8 +24,8 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Residual of solves whose constraints may not be the last ones yet.
-const LOOSE: f64 = 1e-2;
+/// Part of the residual that is left where the constraints may not be the last ones yet.
+const LOOSE: f64 = 0.1;
 /// Deviation from orthonormal directions that is refused.
 const ORTHONORMAL: f64 = 1e-9;
 
@@ -105,8 +105,9 @@ pub(super) struct Held {
     /// Pins, and vertices that are held in all directions.
     pub(super) pinned: Vec<bool>,
     projection: Projection,
-    /// Δv so far.
+    /// Δv so far, and that of the solve before.
     sum: Vec<Vec3>,
+    last: Vec<Vec3>,
     /// Its product with the matrix.
     lanes: Vec<Lanes>,
     product: Vec<Lanes>,
@@ -124,6 +125,7 @@ impl Held {
             + self.projection.bytes()
             + size_of::<Vec3>()
                 * (self.sum.capacity()
+                    + self.last.capacity()
                     + self.rest.capacity()
                     + self.motion.capacity()
                     + self.impulses.capacity())
@@ -235,51 +237,68 @@ impl Workspace {
         set: &mut dyn ActiveSet,
     ) -> Result<SolveInfo, StepError> {
         let n = v.len();
-        held.sum.resize(n, Vec3::zeros());
-        held.rest.resize(n, Vec3::zeros());
-        held.motion.resize(n, Vec3::zeros());
-        for i in 0..n {
-            held.sum[i] = if pins.pinned[i] { self.dv[i] } else { Vec3::zeros() };
+        for list in [&mut held.sum, &mut held.last, &mut held.rest, &mut held.motion] {
+            list.resize(n, Vec3::zeros());
         }
-        let mut tolerance = params.solver.tolerance;
-        let mut first = None;
+        for i in 0..n {
+            held.last[i] = if pins.pinned[i] { self.dv[i] } else { Vec3::zeros() };
+        }
+        let tolerance = params.solver.tolerance;
+        // Whether the solve is to the tolerance, and not loose.
+        let (mut tight, mut solves) = (true, 0);
         let mut total = SolveInfo { iterations: 0, residual: 0.0, converged: true };
         loop {
             held.take(set, pins)?;
-            for c in &held.list {
-                let i = c.vertex as usize;
-                held.sum[i] = c.hold(&held.sum[i], &(c.velocity - v[i]));
+            // Residuals are relative to what a solve from zero starts from; so does this one if the last solution is no
+            // better.
+            for i in 0..n {
+                held.sum[i] = if pins.pinned[i] { held.last[i] } else { Vec3::zeros() };
             }
-            let norm = self.rest(held, v);
-            // The residual of a solve is relative to what the first one starts from.
-            let first = *first.get_or_insert(norm);
+            let first = self.begin(held, v);
+            let mut norm = first;
+            if solves > 0 {
+                std::mem::swap(&mut held.sum, &mut held.last);
+                norm = self.begin(held, v);
+                if !(norm <= first) {
+                    std::mem::swap(&mut held.sum, &mut held.last);
+                    norm = self.begin(held, v);
+                }
+            }
             // Not a number goes on, to the solver's complaint.
             if norm <= tolerance * first && first.is_finite() {
                 total.residual = if first > 0.0 { norm / first } else { 0.0 };
                 total.converged = true;
             } else {
-                let params = SolverParams { tolerance: tolerance * first / norm, ..params.solver };
+                let goal = tolerance * first / norm;
+                let goal = if tight { goal } else { goal.max(LOOSE) };
+                let params = SolverParams { tolerance: goal, ..params.solver };
                 let solved = self.solve_rest(held, &params, pins)?;
                 total.iterations += solved.iterations;
                 total.residual = solved.residual * norm / first;
-                total.converged = solved.converged;
+                total.converged = solved.converged && total.residual <= tolerance;
             }
             self.impulses(held);
             for i in 0..n {
                 held.motion[i] = v[i] + held.sum[i];
             }
+            held.last.copy_from_slice(&held.sum);
+            solves += 1;
             let again = set.judge(&held.motion, &held.impulses);
-            if !again && (tolerance <= params.solver.tolerance || total.residual <= params.solver.tolerance) {
+            if !again && (tight || total.residual <= tolerance) {
                 break;
             }
-            tolerance = params.solver.tolerance.max(if again { LOOSE } else { 0.0 });
+            tight = !again;
         }
         self.dv.copy_from_slice(&held.sum);
         Ok(total)
     }
 
-    /// What is left to be solved for: P (b + p − A Δv) at free vertices; its norm.
-    fn rest(&self, held: &mut Held, v: &[Vec3]) -> f64 {
+    /// Gives Δv its held components; what is left to be solved for: P (b + p − A Δv) at free vertices; its norm.
+    fn begin(&self, held: &mut Held, v: &[Vec3]) -> f64 {
+        for c in &held.list {
+            let i = c.vertex as usize;
+            held.sum[i] = c.hold(&held.sum[i], &(c.velocity - v[i]));
+        }
         self.multiply(held);
         let Held { rest, product, pinned, .. } = held;
         for (i, rest) in rest.iter_mut().enumerate() {

@@ -1,7 +1,7 @@
 //! One contact of a cloth vertex with a collider: the plane that it must not pass.
 
-use super::ConstraintStage;
 use super::surface::Nearest;
+use super::{BAND, ConstraintStage};
 use crate::Vec3;
 use cloth_collision::CollisionMesh;
 use cloth_response::FrictionLaw;
@@ -9,12 +9,17 @@ use nalgebra::Matrix3;
 
 /// The part of the overlap that one step undoes, that of the velocity filter.
 const PUSH_FRACTION: f64 = 0.1;
+/// Contacts end farther by this part of the thickness than the velocity filter asks for, well above rounding: a filter that
+/// has to give even a rounding error of a normal impulse gives all of a viscous force.
+const MARGIN: f64 = 1e-9;
 /// What a vertex may lack of its distance at the end of a step, as a part of the thickness.
 const GAP_TOLERANCE: f64 = 1e-4;
 /// Least cosine between two normals of one contact.
 const LEAST_AGREEMENT: f64 = 0.5;
 /// Closest points nearer to each other than this part of the thickness are one contact.
 const SAME_POINT: f64 = 1e-6;
+/// Far vertices are looked at that come so much nearer as to touch, and a part more.
+const APPROACH: f64 = 1.5;
 /// A contact that has let go this often in a step does not take hold again in it.
 const MAX_RELEASES: u8 = 2;
 
@@ -98,6 +103,13 @@ impl Contact {
         })
     }
 
+    /// Whether a vertex that would go with the mean velocity `u` [m/s] may come to touch.
+    pub(super) fn may_touch(&self, motion: &Motion<'_>, u: &Vec3) -> bool {
+        let thickness = motion.stage.thickness;
+        let way = self.normal.dot(&(u - self.ride)) * motion.dt;
+        self.gap_t0 <= BAND * thickness || self.gap_t0 + APPROACH * way <= thickness
+    }
+
     /// Whether both are at the same point of the surface.
     pub(super) fn same(&self, other: &Self, stage: &ConstraintStage) -> bool {
         (self.point - other.point).norm() <= SAME_POINT * stage.thickness
@@ -132,7 +144,7 @@ impl Contact {
         (side * gap, normal, now.triangle)
     }
 
-    /// Takes hold, or follows the surface, where the vertex would end too near; whether it did.
+    /// Takes hold, or follows the surface, where the vertex would end too near with the mean velocity `u` [m/s]; whether it did.
     pub(super) fn catch(&mut self, motion: &Motion<'_>, vertex: u32, u: &Vec3) -> bool {
         let tolerance = GAP_TOLERANCE * motion.stage.thickness;
         // Far from its plane a vertex is far from the surface, or on its other side.

@@ -6,7 +6,7 @@ use cloth_response::FrictionLaw;
 use nalgebra::Matrix3;
 
 /// Slower sliding has a direction of this speed's stiffness [m/s].
-const LEAST_SPEED: f64 = 1e-6;
+const LEAST_SPEED: f64 = 1e-5;
 /// Part of the speed over which the slope of a law is taken.
 const SLOPE: f64 = 1e-3;
 

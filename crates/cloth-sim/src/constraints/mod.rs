@@ -23,8 +23,10 @@ pub(crate) use sites::{Holds, Settings, Sites};
 pub(crate) use step::failure;
 use surface::Surface;
 
-/// Pairs up to this multiple of the thickness may come to touch within the step.
+/// Pairs up to this multiple of the thickness may come to touch within the step, whatever their velocity.
 const BAND: f64 = 1.25;
+/// Faster ones are looked up from no farther than this multiple; what comes from beyond is the velocity filter's.
+const FARTHEST: f64 = 5.0;
 
 /// What a scene with contact by constraints has beside the velocity filter.
 pub(crate) struct ConstraintStage {
@@ -56,16 +58,19 @@ impl ConstraintStage {
         self.surface.bytes() + 8 * self.areas.len() + self.active.len()
     }
 
-    /// (vertex, triangle) of the cloth vertices near a collider at `x` [m], ascending.
+    /// (vertex, triangle) of the cloth vertices near a collider at `x` [m], ascending; `way`: the farthest that two vertices
+    /// may near each other in the step [m].
     pub(crate) fn near(
         &self,
         mesh: &CollisionMesh,
         bvh: &mut Bvh,
         x: &[Vec3],
         inv_mass: &[f64],
+        way: f64,
         pool: &rayon::ThreadPool,
     ) -> Result<Vec<[u32; 2]>, DetectError> {
-        let stencils = bvh.proximity(mesh, x, BAND * self.thickness, Some(&self.active), pool)?;
+        let radius = (self.thickness + way).clamp(BAND * self.thickness, FARTHEST * self.thickness);
+        let stencils = bvh.proximity(mesh, x, radius, Some(&self.active), pool)?;
         let free = |v: u32| (v as usize) < self.areas.len() && inv_mass[v as usize] > 0.0;
         let mut list: Vec<[u32; 2]> = stencils
             .iter()

@@ -6,8 +6,9 @@
 //! - a vertex that needs more than μ_s N to stick slides, pushed by the kinetic force against the way it would go;
 //! - one that would slide back sticks; else its push is renewed for the sliding and the normal force that came out.
 //!
-//! The search ends when nothing changes and the pushes are right to [`FRICTION_TOLERANCE`], or after [`MAX_SOLVES`]. It starts
-//! from how the contacts were in the last step, so that a steady state takes one solve.
+//! The search ends when the impulses that are wrong are less than [`TOLERANCE`] of all, or after [`MAX_SOLVES`]; what is left
+//! counts for the start of the next step's search, which begins with how the contacts were: a steady state takes one
+//! solve.
 
 use super::ConstraintStage;
 use super::contact::{Contact, Motion};
@@ -18,11 +19,13 @@ use nalgebra::Matrix3;
 use std::time::{Duration, Instant};
 
 /// Most solves of one step.
-const MAX_SOLVES: usize = 10;
-/// Part of the pushes of all vertices by which they may be off.
-const FRICTION_TOLERANCE: f64 = 1e-3;
-/// Impulses of less than this times the mass are taken for none [m/s].
-const SLACK: f64 = 1e-6;
+const MAX_SOLVES: usize = 15;
+/// Part of the impulses of all vertices by which they may be wrong (root of the sum of squares).
+const TOLERANCE: f64 = 2e-3;
+/// Part of a vertex's weight that is taken for none: more than what the linear solver leaves, less than what is seen.
+const SLACK: f64 = 1e-3;
+/// Slower sliding is none [m/s].
+const REST: f64 = 1e-6;
 /// A vertex that has changed between sticking and sliding this often sticks.
 const MAX_FLIPS: u8 = 3;
 /// Least sine between the normals of two contacts that are held at a time.
@@ -111,6 +114,7 @@ impl<'a> Sites<'a> {
             let mut contacts: Vec<Contact> = Vec::with_capacity(1);
             for &[_, triangle] in of_vertex {
                 if let Some(new) = Contact::new(&motion, vertex, triangle)
+                    && new.may_touch(&motion, &(v_t0[vertex as usize] + settings.gravity * settings.dt))
                     && !contacts.iter().any(|c| c.same(&new, stage))
                 {
                     contacts.push(new);
@@ -138,6 +142,11 @@ impl<'a> Sites<'a> {
             sites.push(site);
         }
         Self { motion, settings, sites, list: Vec::new(), solves: 0, clock: Duration::ZERO }
+    }
+
+    /// Solves so far.
+    pub(crate) fn solves(&self) -> usize {
+        self.solves
     }
 
     /// Seconds that the search has taken beside the solves.
@@ -173,28 +182,17 @@ impl ActiveSet for Sites<'_> {
         let clock = Instant::now();
         self.solves += 1;
         let mut impulses = impulses.iter();
-        let (mut changed, mut off, mut pushes) = (false, 0.0, 0.0);
+        let (mut wrong, mut all) = (0.0, 0.0);
         for site in &mut self.sites {
             let own = if site.basis.count > 0 { impulses.next() } else { None };
             site.impulse = own.copied().unwrap_or_default();
-            let verdict = site.judge(&self.motion, &motion[site.vertex as usize], &self.settings);
-            changed |= verdict.changed;
-            off += verdict.off;
-            pushes += verdict.push;
+            all += site.impulse.norm_squared();
+            let own = site.judge(&self.motion, &motion[site.vertex as usize], &self.settings);
+            wrong += own * own;
         }
         self.clock += clock.elapsed();
-        let again = changed || off > FRICTION_TOLERANCE * FRICTION_TOLERANCE * pushes;
-        again && self.solves < MAX_SOLVES
+        wrong > TOLERANCE * TOLERANCE * all && self.solves < MAX_SOLVES
     }
-}
-
-/// What a solve came to at a vertex.
-#[derive(Default)]
-struct Verdict {
-    changed: bool,
-    /// Squares of the push's error and of the push [N² s²].
-    off: f64,
-    push: f64,
 }
 
 impl Site {
@@ -202,19 +200,23 @@ impl Site {
     fn start(&mut self, motion: &Motion<'_>, v: &Vec3, before: Option<(Vec3, bool)>, settings: &Settings) {
         let dt = settings.dt;
         let ahead = v + settings.gravity * dt;
+        // What pressed in the last step may do so where gravity alone would not bring it, but not if the surface leaves.
+        let pressed = settings.gravity.norm() * dt;
         for contact in &mut self.contacts {
+            let away = contact.normal.dot(&ahead) - contact.least;
             contact.held = match before {
-                Some((impulse, _)) => contact.normal.dot(&impulse) > 0.0,
-                None => contact.normal.dot(&ahead) < contact.least,
+                Some((impulse, _)) => contact.normal.dot(&impulse) > 0.0 && away < pressed,
+                None => away < 0.0,
             };
         }
-        let Some(first) = self.contacts.iter().position(|c| c.held) else { return };
+        let held = self.contacts.iter().position(|c| c.held);
+        let first = held.unwrap_or(0);
         let Contact { ride, normal, .. } = self.contacts[first];
         let slip = v - ride;
         let slip = slip - normal * normal.dot(&slip);
         let speed = slip.norm();
         self.speed_t0 = speed;
-        if speed <= SLACK || before.is_some_and(|(_, slid)| !slid) {
+        if held.is_none() || speed <= REST || before.is_some_and(|(_, slid)| !slid) {
             return;
         }
         // Where it slides to, for the plane there.
@@ -236,8 +238,10 @@ impl Site {
         let stops = kinetic(&loads, speed, dt) >= self.mass * speed;
         if before.is_some() || !stops {
             let tangential = self.tangential();
-            let push = Push::new(&loads, slip / speed, speed, speed, &ride, &tangential, settings);
-            self.mode = Mode::Slide(push);
+            if let Some(direction) = (tangential * slip).try_normalize(0.0) {
+                let push = Push::new(&loads, direction, speed, speed, &ride, &tangential, settings);
+                self.mode = Mode::Slide(push);
+            }
         }
     }
 
@@ -326,61 +330,73 @@ impl Site {
         })
     }
 
-    fn judge(&mut self, motion: &Motion<'_>, u: &Vec3, settings: &Settings) -> Verdict {
+    /// Judges a solve in which the vertex got the mean velocity `u` [m/s]: the impulse that was wrong [N s].
+    fn judge(&mut self, motion: &Motion<'_>, u: &Vec3, settings: &Settings) -> f64 {
         let impulses = self.normal_impulses(&self.impulse);
-        let mut changed = false;
+        let slack = SLACK * self.mass * settings.gravity.norm() * settings.dt;
+        let mut wrong = 0.0_f64;
         for j in 0..self.basis.count {
-            if impulses[j] < -SLACK * self.mass {
+            if impulses[j] < -slack {
                 self.contacts[self.basis.contact[j]].release();
-                changed = true;
+                wrong -= impulses[j];
             }
         }
-        if changed {
-            return Verdict { changed, ..Verdict::default() };
+        if wrong > 0.0 {
+            return wrong;
         }
-        let free = self.basis.count == 0;
+        let (free, loads) = (self.basis.count == 0, self.loads(&impulses));
         // A vertex that goes with the only surface near it ends where it should.
         if free || self.contacts.len() > 1 || matches!(self.mode, Mode::Slide(_)) {
             for contact in &mut self.contacts {
-                changed |= contact.catch(motion, self.vertex, u);
+                if contact.catch(motion, self.vertex, u) {
+                    // How much cloth hangs on the vertex is not known: never too little.
+                    wrong = f64::INFINITY;
+                }
             }
         }
         if free {
-            if changed {
+            if wrong > 0.0 {
                 self.mode = Mode::Stick;
             }
-            return Verdict { changed, ..Verdict::default() };
+            return wrong;
         }
-        let loads = self.loads(&impulses);
+        let pull = self.tangential() * self.impulse;
+        if wrong > 0.0 {
+            // Planes have turned: what follows lies in the new ones.
+            self.basis();
+        }
         let tangential = self.tangential();
         let ride = self.contacts[self.basis.contact[0]].ride;
         match &self.mode {
             Mode::Stick => {
-                let pull = tangential * self.impulse;
                 let size = pull.norm();
-                if size > sticking(&loads) + SLACK * self.mass && self.flips < MAX_FLIPS {
-                    let push =
-                        Push::new(&loads, -pull / size, 0.0, self.speed_t0, &ride, &tangential, settings);
+                let excess = size - sticking(&loads);
+                let direction = (tangential * -pull).try_normalize(0.0);
+                if excess > slack
+                    && self.flips < MAX_FLIPS
+                    && let Some(direction) = direction
+                {
+                    let push = Push::new(&loads, direction, 0.0, self.speed_t0, &ride, &tangential, settings);
                     self.mode = Mode::Slide(push);
                     self.flips += 1;
-                    changed = true;
+                    wrong += excess;
                 }
-                Verdict { changed, ..Verdict::default() }
+                wrong
             }
             Mode::Slide(push) => {
                 let slip = tangential * (u - ride);
                 let speed = slip.norm();
+                let given = tangential * push.at(u);
                 if !(push.direction.dot(&slip) > 0.0) {
                     self.mode = Mode::Stick;
                     self.flips += 1;
-                    return Verdict { changed: true, ..Verdict::default() };
+                    return wrong + kinetic(&loads, 0.5 * self.speed_t0, settings.dt).min(given.norm());
                 }
                 let direction = slip / speed;
                 let size = kinetic(&loads, 0.5 * (self.speed_t0 + speed), settings.dt);
-                let off = (tangential * push.at(u) + direction * size).norm_squared();
                 let push = Push::new(&loads, direction, speed, self.speed_t0, &ride, &tangential, settings);
                 self.mode = Mode::Slide(push);
-                Verdict { changed, off, push: size * size }
+                wrong + (given + direction * size).norm()
             }
         }
     }

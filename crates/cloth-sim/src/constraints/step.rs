@@ -12,7 +12,8 @@ use std::time::Instant;
 const STAGE: &str = "contact constraints";
 
 impl Simulation {
-    /// The end of the step with cloth vertices on colliders held by constraints; `None` for a scene without.
+    /// The end of the step with cloth vertices on colliders held by constraints, what those did, and the number of solves;
+    /// `None` for a scene without.
     ///
     /// What contact is expected to give beside the constraints goes in before and out again afterwards, as without them:
     /// but not where it lifts a vertex that a constraint holds, which gives that itself.
@@ -24,17 +25,21 @@ impl Simulation {
         pin_x: &[Vec3],
         pin_v: &[Vec3],
         report: &mut StepReport,
-    ) -> Result<Option<(StepInfo, Holds)>, Failure> {
+    ) -> Result<Option<(StepInfo, Holds, usize)>, Failure> {
         let Self { contact, integrator, state, pins, inv_mass, pool, scene, .. } = self;
         let Some(ContactStage { mesh, bvh, constraints: Some(own), .. }) = contact else { return Ok(None) };
         let clock = Instant::now();
-        let near = own
-            .near(mesh, bvh, &state.x, inv_mass, pool)
-            .map_err(|e| Failure::Stop(stage("contact constraints", &e)))?;
         let masses = integrator.system().masses();
         let cloth = masses.len();
+        // Colliders' velocities are those of this step, cloth's those of its start.
+        let fastest = |v: &[Vec3]| v.iter().map(Vec3::norm_squared).fold(0.0, f64::max).sqrt();
+        let gravity: Vec3 = scene.gravity().into();
+        let way = dt * (fastest(&v[..cloth]) + fastest(&v[cloth..]) + dt * gravity.norm());
+        let near = own
+            .near(mesh, bvh, &state.x, inv_mass, way, pool)
+            .map_err(|e| Failure::Stop(stage("contact constraints", &e)))?;
         let (cloth_x, colliders) = x.split_at_mut(cloth);
-        let settings = Settings { dt, gravity: scene.gravity().into() };
+        let settings = Settings { dt, gravity };
         let mut sites =
             Sites::new(own, mesh, &near, &state.x, &state.v, colliders, masses, &state.holds, settings);
         let mut expected = state.contact_force.clone();
@@ -61,7 +66,7 @@ impl Simulation {
             v[i] -= change;
             cloth_x[i] -= change * dt;
         }
-        Ok(Some((info, sites.finish(cloth))))
+        Ok(Some((info, sites.finish(cloth), sites.solves())))
     }
 }
 
