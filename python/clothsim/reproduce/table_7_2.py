@@ -199,7 +199,7 @@ def here(measured: Measured) -> str:
     response, step = (np.median(times["CSSV"], axis=0).mean() for times in (measured.response, measured.step))
     return (
         f"{2 * measured.setup.cells**2:,} triangles: {', '.join(words)} on {measured.threads} CPU "
-        f"thread{'s' if measured.threads > 1 else ''}; CSSV takes {over[0]:+.0f} % over C (by least times {over[1]:+.0f} "
+        f"thread{'s' if measured.threads > 1 else ''}; CSSV takes {over[0]:+.0f} % over C (least times {over[1]:+.0f} "
         f"%; the thesis: +38 %); response is {100.0 * response / step:.0f} % of a step (the thesis: under 8 %)"
     )
 
