@@ -84,8 +84,8 @@ impl Contact {
             ((moved + (turned - start.r)) / motion.dt, turned)
         };
         let thickness = motion.stage.thickness;
-        let target =
-            if gap_t0 > thickness { thickness } else { gap_t0 + PUSH_FRACTION * (thickness - gap_t0) };
+        let rest = if gap_t0 > thickness { thickness } else { gap_t0 + PUSH_FRACTION * (thickness - gap_t0) };
+        let target = rest + MARGIN * thickness;
         let normal = r.try_normalize(0.0)?;
         let bodies = [vertex, motion.mesh.triangles[start.triangle as usize][0]];
         let [a, b] = bodies.map(|v| motion.mesh.vertex_body[v as usize]);

@@ -19,7 +19,12 @@ use nalgebra::Matrix3;
 use std::time::{Duration, Instant};
 
 /// Most solves of one step.
-const MAX_SOLVES: usize = 15;
+const MAX_SOLVES: usize = 20;
+/// Solves after which nothing takes hold or starts to slide any more, so that the search comes to an end in which nothing pulls.
+const SETTLING: usize = 12;
+/// Solves after which pushes follow the mean of the last two normal forces: where friction turns on the force that presses
+/// it, the two would answer each other without end.
+const DAMPED: usize = 4;
 /// Part of the impulses of all vertices by which they may be wrong (root of the sum of squares).
 const TOLERANCE: f64 = 2e-3;
 /// Part of a vertex's weight that is taken for none: more than what the linear solver leaves, less than what is seen.
@@ -78,8 +83,9 @@ struct Site {
     /// Sliding speed at the start [m/s].
     speed_t0: f64,
     basis: Basis,
-    /// What the last solve's constraint gave [N s].
+    /// What the last solve's constraint gave [N s], and the normal impulses of which pushes are made.
     impulse: Vec3,
+    normals: [f64; MOST],
 }
 
 /// The search of one step.
@@ -136,6 +142,7 @@ impl<'a> Sites<'a> {
                 speed_t0: 0.0,
                 basis: Basis::default(),
                 impulse: Vec3::zeros(),
+                normals: [0.0; MOST],
             };
             let held = before.force.get(i).map(|f| (*f * settings.dt, before.sliding[i]));
             site.start(&motion, &v_t0[i], held.filter(|h| h.0 != Vec3::zeros()), &settings);
@@ -187,7 +194,7 @@ impl ActiveSet for Sites<'_> {
             let own = if site.basis.count > 0 { impulses.next() } else { None };
             site.impulse = own.copied().unwrap_or_default();
             all += site.impulse.norm_squared();
-            let own = site.judge(&self.motion, &motion[site.vertex as usize], &self.settings);
+            let own = site.judge(&self.motion, &motion[site.vertex as usize], &self.settings, self.solves);
             wrong += own * own;
         }
         self.clock += clock.elapsed();
@@ -331,7 +338,7 @@ impl Site {
     }
 
     /// Judges a solve in which the vertex got the mean velocity `u` [m/s]: the impulse that was wrong [N s].
-    fn judge(&mut self, motion: &Motion<'_>, u: &Vec3, settings: &Settings) -> f64 {
+    fn judge(&mut self, motion: &Motion<'_>, u: &Vec3, settings: &Settings, solves: usize) -> f64 {
         let impulses = self.normal_impulses(&self.impulse);
         let slack = SLACK * self.mass * settings.gravity.norm() * settings.dt;
         let mut wrong = 0.0_f64;
@@ -344,9 +351,13 @@ impl Site {
         if wrong > 0.0 {
             return wrong;
         }
-        let (free, loads) = (self.basis.count == 0, self.loads(&impulses));
+        let (free, settling) = (self.basis.count == 0, solves > SETTLING);
+        for (mean, new) in self.normals.iter_mut().zip(impulses) {
+            *mean = if solves > DAMPED && *mean > 0.0 { 0.5 * (*mean + new) } else { new };
+        }
+        let loads = self.loads(&self.normals);
         // A vertex that goes with the only surface near it ends where it should.
-        if free || self.contacts.len() > 1 || matches!(self.mode, Mode::Slide(_)) {
+        if !settling && (free || self.contacts.len() > 1 || matches!(self.mode, Mode::Slide(_))) {
             for contact in &mut self.contacts {
                 if contact.catch(motion, self.vertex, u) {
                     // How much cloth hangs on the vertex is not known: never too little.
@@ -374,6 +385,7 @@ impl Site {
                 let direction = (tangential * -pull).try_normalize(0.0);
                 if excess > slack
                     && self.flips < MAX_FLIPS
+                    && !settling
                     && let Some(direction) = direction
                 {
                     let push = Push::new(&loads, direction, 0.0, self.speed_t0, &ride, &tangential, settings);
@@ -396,7 +408,7 @@ impl Site {
                 let size = kinetic(&loads, 0.5 * (self.speed_t0 + speed), settings.dt);
                 let push = Push::new(&loads, direction, speed, self.speed_t0, &ride, &tangential, settings);
                 self.mode = Mode::Slide(push);
-                wrong + (given + direction * size).norm()
+                if settling { wrong } else { wrong + (given + direction * size).norm() }
             }
         }
     }
