@@ -81,6 +81,11 @@ class Run:
     covered: Floats  # share of the cloth's area that its shadow on the plane has
     states: list[Floats]
 
+    @property
+    def uncovered(self) -> Floats:
+        """Share of its area that a flat cloth would cover besides."""
+        return 1.0 - self.covered
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -243,8 +248,9 @@ def checks(measured: Measured) -> Sequence[Check]:
         Check.true("CSS slides slower", bool(stribeck.speed[-1] < coulomb.speed[-1]), source),
     ]
     if measured.setup.cells >= FINE:  # folds of a coarse mesh are a matter of chance
-        folds = [float(run.folds[_landed(run)].mean()) for run in (coulomb, stribeck)]
-        found.append(Check.true("CSS folds more", folds[1] > folds[0], source))
+        for what, name in (("rms curvature", "folds"), ("area that it does not cover", "uncovered")):
+            folds = [float(getattr(run, name)[_landed(run)].mean()) for run in (coulomb, stribeck)]
+            found.append(Check.true(f"CSS folds more: {what}", folds[1] > folds[0], source))
     return found
 
 
