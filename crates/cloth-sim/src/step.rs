@@ -185,15 +185,15 @@ impl Simulation {
         pin_v: &[Vec3],
         report: &mut StepReport,
     ) -> Result<(StepInfo, Holds, usize), Failure> {
-        let (info, holds, solves) = match self.constrained_dynamics(dt, x, v, pin_x, pin_v, report)? {
-            Some(done) => done,
-            None => {
-                let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
-                self.expect_contact(dt, v);
-                let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?;
-                self.forget_contact(dt, x, v);
-                (info, Holds::default(), 0)
-            }
+        let constrained = self.constrained_dynamics(dt, x, v, pin_x, pin_v, report)?;
+        let (info, holds, solves) = if let Some(done) = constrained {
+            done
+        } else {
+            let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
+            self.expect_contact(dt, v);
+            let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?;
+            self.forget_contact(dt, x, v);
+            (info, Holds::default(), 0)
         };
         for (name, seconds) in &info.seconds {
             add_seconds(&mut report.seconds, name, *seconds);

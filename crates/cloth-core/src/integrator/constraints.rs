@@ -259,7 +259,7 @@ impl Workspace {
             if solves > 0 {
                 std::mem::swap(&mut held.sum, &mut held.last);
                 norm = self.begin(held, v);
-                if !(norm <= first) {
+                if norm.is_nan() || norm > first {
                     std::mem::swap(&mut held.sum, &mut held.last);
                     norm = self.begin(held, v);
                 }

@@ -153,7 +153,8 @@ impl Contact {
             return false;
         }
         let (gap, normal, triangle) = self.at(motion, vertex, u);
-        if !(self.target - gap > tolerance) {
+        let lacking = self.target - gap;
+        if lacking.is_nan() || lacking <= tolerance {
             return false;
         }
         if normal.dot(&self.normal) > LEAST_AGREEMENT {

@@ -92,7 +92,7 @@ struct Site {
 pub(crate) struct Sites<'a> {
     motion: Motion<'a>,
     settings: Settings,
-    sites: Vec<Site>,
+    near: Vec<Site>,
     list: Vec<Constraint>,
     solves: usize,
     clock: Duration,
@@ -148,7 +148,7 @@ impl<'a> Sites<'a> {
             site.start(&motion, &v_t0[i], held.filter(|h| h.0 != Vec3::zeros()), &settings);
             sites.push(site);
         }
-        Self { motion, settings, sites, list: Vec::new(), solves: 0, clock: Duration::ZERO }
+        Self { motion, settings, near: sites, list: Vec::new(), solves: 0, clock: Duration::ZERO }
     }
 
     /// Solves so far.
@@ -163,13 +163,13 @@ impl<'a> Sites<'a> {
 
     /// Vertices held from the start, with the normal that pushes them off.
     pub(crate) fn held(&self) -> impl Iterator<Item = (u32, Vec3)> {
-        self.sites.iter().filter_map(|s| s.contacts.iter().find(|c| c.held).map(|c| (s.vertex, c.normal)))
+        self.near.iter().filter_map(|s| s.contacts.iter().find(|c| c.held).map(|c| (s.vertex, c.normal)))
     }
 
     /// What the last solve's constraints did to the `cloth` vertices.
     pub(crate) fn finish(&self, cloth: usize) -> Holds {
         let mut holds = Holds { force: vec![Vec3::zeros(); cloth], sliding: vec![false; cloth] };
-        for site in &self.sites {
+        for site in &self.near {
             let i = site.vertex as usize;
             holds.force[i] = site.impulse / self.settings.dt;
             holds.sliding[i] = matches!(site.mode, Mode::Slide(_)) && site.impulse != Vec3::zeros();
@@ -181,7 +181,7 @@ impl<'a> Sites<'a> {
 impl ActiveSet for Sites<'_> {
     fn constraints(&mut self) -> &[Constraint] {
         self.list.clear();
-        self.list.extend(self.sites.iter_mut().filter_map(Site::constraint));
+        self.list.extend(self.near.iter_mut().filter_map(Site::constraint));
         &self.list
     }
 
@@ -190,7 +190,7 @@ impl ActiveSet for Sites<'_> {
         self.solves += 1;
         let mut impulses = impulses.iter();
         let (mut wrong, mut all) = (0.0, 0.0);
-        for site in &mut self.sites {
+        for site in &mut self.near {
             let own = if site.basis.count > 0 { impulses.next() } else { None };
             site.impulse = own.copied().unwrap_or_default();
             all += site.impulse.norm_squared();
@@ -399,7 +399,7 @@ impl Site {
                 let slip = tangential * (u - ride);
                 let speed = slip.norm();
                 let given = tangential * push.at(u);
-                if !(push.direction.dot(&slip) > 0.0) {
+                if speed.is_nan() || push.direction.dot(&slip) <= 0.0 {
                     self.mode = Mode::Stick;
                     self.flips += 1;
                     return wrong + kinetic(&loads, 0.5 * self.speed_t0, settings.dt).min(given.norm());

@@ -210,7 +210,9 @@ fn impulses_balance_momentum() {
         let mut integrator = integrator(&mesh, method, SolverMethod::Pcg);
         // No drag: the push is given, and what is given is all that is not internal.
         let mut list = constraints();
-        list.iter_mut().for_each(|c| c.drag = Matrix3::zeros());
+        for c in &mut list {
+            c.drag = Matrix3::zeros();
+        }
         let mut set = Fixed::new(list);
         let (_, v) = state(&mesh);
         let (_, v1, _) = step(&mut integrator, &mut set).unwrap();
