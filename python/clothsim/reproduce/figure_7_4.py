@@ -101,6 +101,11 @@ class Measured:
         """Mean over the gaits of a number of each run."""
         return float(np.mean([getattr(self.runs[law, period], name) for period in self.setup.periods]))
 
+    def difference(self, name: str) -> tuple[float, float]:
+        """How much larger a number is with CSS than with C: mean of the gaits and its standard error."""
+        each = [getattr(self.runs["CSS", p], name) - getattr(self.runs["C", p], name) for p in self.setup.periods]
+        return float(np.mean(each)), float(np.std(each, ddof=1) / np.sqrt(len(each)))
+
 
 def measure(effort: Effort) -> Measured:
     """Let the figure walk in both skirts, in each gait."""
@@ -238,10 +243,14 @@ def here(measured: Measured) -> str:
         f"{measured.mean(law, 'left'):.1f}/m"
         for law in LAWS
     ]
-    return (
-        f"rms curvature of the skirt, area bent above {SHARP:g}/m, and rms "
-        f"curvature left when it has stood still, {gaits}: {'; '.join(words)}"
+    text = (
+        f"rms curvature of the skirt, area bent above {SHARP:g}/m, and rms curvature left when it has stood still, "
+        f"{gaits}: {'; '.join(words)}"
     )
+    if count > 1:
+        more, scatter = measured.difference("mean")
+        text += f"; CSS − C {more:+.2f} ± {scatter:.2f}/m while walking (mean and standard error of the gaits)"
+    return text
 
 
 def checks(measured: Measured) -> Sequence[Check]:

@@ -294,30 +294,31 @@ def _mean(values: Any) -> float:
 
 
 def checks(measured: Measured) -> Sequence[Check]:
-    """Stick–slip where the thesis finds it and nowhere else; what breaks the lower part loose is μ_s."""
+    """Stick–slip where the thesis finds it and nowhere else; both contact methods alike."""
     source, s = "thesis 7.5, figure 7.5", measured.setup
     found = [
         Check("C: share of the time at rest", measured.stuck("C"), 0.0, 0.0, f"{source}: smooth"),
         Check("C: slips", float(len(measured.cycles["C"])), 0.0, 0.0, source),
     ]
     for law in ("CS", "CSS"):
-        cycles, periods = measured.cycles[law], measured.periods(law)
+        cycles = measured.cycles[law]
         pull = _mean([c.pull for c in cycles])
-        spread = float(np.std(periods) / np.mean(periods)) if len(periods) > 1 else math.nan
         found += [
-            Check.true(f"{law}: sticks and slips, more than twice", len(cycles) > 2, source),
+            Check.true(f"{law}: sticks and slips, more than once", len(cycles) > 1, source),
             Check.true(f"{law}: the pull that breaks loose lies between sliding and static friction",
                        COEFFICIENTS.mu_c < pull < COEFFICIENTS.mu_s, "an elastic sheet gives way from its edge on"),
-            Check(f"{law}: spread of the period, relative", spread, 0.0, 0.2, f"{source}: periodically"),
         ]  # fmt: skip
     every = [_mean(measured.periods(variant)) for variant in ("CSS", OTHER)]
     slips = [_mean([cycle.slip for cycle in measured.cycles[variant]]) for variant in ("CSS", OTHER)]
+    periods = measured.periods("CSS")
+    spread = float(np.std(periods)) / every[0] if len(periods) > 1 else math.nan
     either = "two contact methods, one law"
     glide = float(measured.runs["C"].pull[measured.steady("C")].mean())
     expected = COEFFICIENTS.mu_c + s.air_damping * s.speed / GRAVITY
     row = s.cell / (0.5 * _lying(s))
     return [
         *found,
+        Check("CSS: spread of the period, relative", spread, 0.0, 0.1, f"{source}: periodically"),
         Check("CSS: period with constraints over that with the filter", every[1] / every[0], 1.0, 0.1, either),
         Check("CSS: slip with constraints over that with the filter", slips[1] / slips[0], 1.0, 0.1, either),
         Check("C: mean pull while gliding, over the lying weight", glide, expected, row * expected,

@@ -279,7 +279,7 @@ def draw(measured: Measured) -> bytes:
     for row, law in enumerate(DRAWN):
         run = measured.runs[law, 0]
         for column, moment in enumerate(measured.moments):
-            spin = run.spin[round(moment * FPS)]
+            spin = abs(float(run.spin[round(moment * FPS)]))
             sphere = max(0.0, moment - s.settling) * s.acceleration
             words = f"{moment:.2f} s: sphere {sphere:.0f}, cloth {spin:.1f} rad/s"
             pictures.show(axes[row, column], images[row * count + column], law if column == 0 else "", words)
@@ -300,6 +300,7 @@ def draw(measured: Measured) -> bytes:
     times = measured.runs["C", 0].times
     spin.plot(times, np.maximum(0.0, times - s.settling) * s.acceleration, color=pictures.FAINT, linewidth=1.0,
               label="sphere")  # fmt: skip
+    spin.set_xlim(0.0, touch.get_xlim()[1])
     spin.set_ylim(0.0, 1.25 * max(float(measured.runs[law, 0].spin.max()) for law in LAWS))
     spin.legend(frameon=False, fontsize=9.5, loc="upper left")
     off.set_xticks(range(len(LAWS)), LAWS)
