@@ -398,6 +398,65 @@ pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = 
         assert_eq!(sim.state, straight.state);
     }
 
+    /// A card that slides down a slope, held by contact constraints.
+    fn sliding() -> Simulation {
+        let text = r#"
+duration = 1.0
+[time]
+dt = 0.01
+[contact]
+method = "constraints"
+thickness = 0.01
+friction = { law = "coulomb-stiction", mu_c = 0.1, mu_s = 0.2 }
+[[cloth]]
+name = "card"
+mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 6, ny = 6 }
+material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 50.0 } }
+position = [-0.003, 0.01, 0.0]
+rotation = { axis = [0, 0, 1], angle = 0.3 }
+[[collider]]
+name = "slope"
+shape = { type = "plane", half_size = 3.0 }
+rotation = { axis = [0, 0, 1], angle = 0.3 }
+"#;
+        let scene = Scene::parse_toml(text, "test.toml").unwrap();
+        let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+        Simulation::new(&scene, Assets::default(), options).unwrap()
+    }
+
+    #[test]
+    fn a_retry_leaves_no_trace_in_contact_constraints() {
+        let mut retried = sliding();
+        retried.step().unwrap();
+        // An attempt that the guard gives up, after a search of its own.
+        let good = retried.state.clone();
+        retried.state.v[7].x = 1e6;
+        let before = retried.state.clone();
+        assert!(retried.attempt(0.02, 0.01, &mut crate::StepReport::default()).is_err());
+        assert_eq!(retried.state, before);
+        retried.state = good;
+        retried.fail = |time, dt| time < 0.015 && dt > 0.006;
+        retried.step().unwrap();
+        let mut straight = sliding();
+        for [end, dt] in [[0.01, 0.01], [0.015, 0.005], [0.02, 0.005]] {
+            straight.step_to(end, dt).unwrap();
+        }
+        let state = |sim: &Simulation| (sim.state.x.clone(), sim.state.v.clone(), sim.state.holds.clone());
+        assert!(state(&retried) == state(&straight));
+        assert!(retried.state.holds.sliding.iter().any(|s| *s));
+        let mut whole = sliding();
+        whole.step().unwrap();
+        whole.step().unwrap();
+        assert!(state(&retried) != state(&whole), "the comparison sees a difference");
+        // What is not a number comes out as an alarm that names vertices, and the state stays.
+        let good = retried.state.clone();
+        retried.fail = |_, _| false;
+        retried.state.v[7].x = f64::NAN;
+        let SimError::Diverged { vertices, .. } = retried.step().unwrap_err() else { panic!("diverged") };
+        assert!(!vertices.is_empty());
+        assert_eq!(retried.state.x, good.x);
+    }
+
     #[test]
     fn sub_steps_that_succeed_before_one_that_fails_are_kept() {
         let mut sim = simulation();

@@ -69,7 +69,8 @@ impl ConstraintStage {
         way: f64,
         pool: &rayon::ThreadPool,
     ) -> Result<Vec<[u32; 2]>, DetectError> {
-        let radius = (self.thickness + way).clamp(BAND * self.thickness, FARTHEST * self.thickness);
+        // Not a number looks as far as nothing does.
+        let radius = (self.thickness + way).max(BAND * self.thickness).min(FARTHEST * self.thickness);
         let stencils = bvh.proximity(mesh, x, radius, Some(&self.active), pool)?;
         let free = |v: u32| (v as usize) < self.areas.len() && inv_mass[v as usize] > 0.0;
         let mut list: Vec<[u32; 2]> = stencils

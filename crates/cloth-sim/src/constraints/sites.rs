@@ -223,7 +223,7 @@ impl Site {
         let slip = slip - normal * normal.dot(&slip);
         let speed = slip.norm();
         self.speed_t0 = speed;
-        if held.is_none() || speed <= REST || before.is_some_and(|(_, slid)| !slid) {
+        if held.is_none() || speed.is_nan() || speed <= REST || before.is_some_and(|(_, slid)| !slid) {
             return;
         }
         // Where it slides to, for the plane there.
