@@ -27,7 +27,8 @@ const SETTLING: usize = 12;
 const DAMPED: usize = 4;
 /// Part of the impulses of all vertices by which they may be wrong (root of the sum of squares).
 const TOLERANCE: f64 = 2e-3;
-/// Part of a vertex's weight that is taken for none: more than what the linear solver leaves, less than what is seen.
+/// Part of a vertex's weight, or of the mean impulse where that is more, that is taken for none: more than what the linear
+/// solver leaves, less than what is seen.
 const SLACK: f64 = 1e-3;
 /// Slower sliding is none [m/s].
 const REST: f64 = 1e-6;
@@ -188,13 +189,15 @@ impl ActiveSet for Sites<'_> {
     fn judge(&mut self, motion: &[Vec3], impulses: &[Vec3]) -> bool {
         let clock = Instant::now();
         self.solves += 1;
+        let all: f64 = impulses.iter().map(Vec3::norm_squared).sum();
+        let mean = (all / impulses.len().max(1) as f64).sqrt();
         let mut impulses = impulses.iter();
-        let (mut wrong, mut all) = (0.0, 0.0);
+        let mut wrong = 0.0;
         for site in &mut self.near {
             let own = if site.basis.count > 0 { impulses.next() } else { None };
             site.impulse = own.copied().unwrap_or_default();
-            all += site.impulse.norm_squared();
-            let own = site.judge(&self.motion, &motion[site.vertex as usize], &self.settings, self.solves);
+            let own =
+                site.judge(&self.motion, &motion[site.vertex as usize], &self.settings, mean, self.solves);
             wrong += own * own;
         }
         self.clock += clock.elapsed();
@@ -207,12 +210,16 @@ impl Site {
     fn start(&mut self, motion: &Motion<'_>, v: &Vec3, before: Option<(Vec3, bool)>, settings: &Settings) {
         let dt = settings.dt;
         let ahead = v + settings.gravity * dt;
-        // What pressed in the last step may do so where gravity alone would not bring it, but not if the surface leaves.
-        let pressed = settings.gravity.norm() * dt;
+        let weight = settings.gravity.norm() * dt;
         for contact in &mut self.contacts {
             let away = contact.normal.dot(&ahead) - contact.least;
             contact.held = match before {
-                Some((impulse, _)) => contact.normal.dot(&impulse) > 0.0 && away < pressed,
+                // What pressed in the last step may do so again where gravity alone would not bring it (a belt's tension
+                // does), but not if the surface leaves faster than that could follow.
+                Some((impulse, _)) => {
+                    let pressed = contact.normal.dot(&impulse);
+                    pressed > 0.0 && away < weight.max(pressed / self.mass)
+                }
                 None => away < 0.0,
             };
         }
@@ -337,10 +344,11 @@ impl Site {
         })
     }
 
-    /// Judges a solve in which the vertex got the mean velocity `u` [m/s]: the impulse that was wrong [N s].
-    fn judge(&mut self, motion: &Motion<'_>, u: &Vec3, settings: &Settings, solves: usize) -> f64 {
+    /// Judges a solve in which the vertex got the mean velocity `u` [m/s] and all had the `mean` impulse [N s]: the impulse that
+    /// was wrong [N s].
+    fn judge(&mut self, motion: &Motion<'_>, u: &Vec3, settings: &Settings, mean: f64, solves: usize) -> f64 {
         let impulses = self.normal_impulses(&self.impulse);
-        let slack = SLACK * self.mass * settings.gravity.norm() * settings.dt;
+        let slack = SLACK * mean.max(self.mass * settings.gravity.norm() * settings.dt);
         let mut wrong = 0.0_f64;
         for j in 0..self.basis.count {
             if impulses[j] < -slack {
