@@ -41,7 +41,7 @@ LAWS = sliding.laws(mu_c=0.1, mu_s=0.3, v_s=0.4, delta_s=0.2, f_v=5.0)
 MORE = ((1e-3, CELL, SIDES), (DT, 4e-3, 240), (DT, 2e-3, 100))
 # Likewise tighter belts: Y [N/m]; and up to which of them each method is held to the bound.
 TIGHTER = (20.0, 100.0)
-HELD = {"velocity-filter": 20.0, "constraints": STIFFNESS}
+HELD = {"velocity-filter": 20.0, "constraints": 100.0}
 DAMPING = 0.02  # of the belt's stretch [s]: takes out vibrations, and adds 1e-3 to the ratio's logarithm at most
 # Claimed: ratio of the tensions [%].
 BOUND = 3.0
