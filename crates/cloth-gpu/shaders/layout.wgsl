@@ -14,3 +14,49 @@ struct LengthParams {
 fn group_index(group: vec3<u32>, groups: vec3<u32>) -> u32 {
     return group.x + group.y * groups.x;
 }
+
+// What is asked of the broad phase.
+struct SceneParams {
+    triangles: u32,
+    // Index of the positions at t1: vertices in a moving query, 0 in a resting one, which has one end.
+    second: u32,
+    all_active: u32,
+    pad: u32,
+    // Box of the scene.
+    low: vec3<f32>,
+    pad_low: u32,
+    high: vec3<f32>,
+    pad_high: u32,
+}
+
+struct Grid {
+    low: vec3<f32>,
+    size: f32,
+    cells: vec3<u32>,
+    inverse: f32,
+}
+
+// Part of the triangle pairs: from start on, count of them.
+struct PairParams {
+    // Registrations: n = min(most, lengths[word]).
+    most: u32,
+    word: u32,
+    start_low: u32,
+    start_high: u32,
+    count: u32,
+    pad_0: u32,
+    pad_1: u32,
+    pad_2: u32,
+}
+
+// The boxes of a triangle at both ends of the step.
+struct Bounds {
+    low_0: vec3<f32>,
+    is_active: u32,
+    high_0: vec3<f32>,
+    body: u32,
+    low_1: vec3<f32>,
+    pad_low: u32,
+    high_1: vec3<f32>,
+    pad_high: u32,
+}

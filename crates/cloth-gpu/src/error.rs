@@ -49,6 +49,16 @@ pub enum GpuError {
         /// Largest binding [B].
         limit: u64,
     },
+    /// A dispatch has more workgroups than the device takes, folded to two dimensions.
+    #[error("gpu: kernel {kernel}: {needed} workgroups, the device takes {limit}")]
+    TooManyWorkgroups {
+        /// Name of the kernel.
+        kernel: &'static str,
+        /// Workgroups.
+        needed: u64,
+        /// The most there may be.
+        limit: u64,
+    },
     /// The device has no memory left.
     #[error("gpu: {what}: no memory for {bytes} bytes")]
     OutOfMemory {

@@ -17,9 +17,13 @@ pub mod twin;
 mod buffers;
 mod context;
 mod error;
+mod frame;
+mod grid;
 mod recorder;
 
 pub use buffers::{Array, Length};
 pub use context::{AdapterChoice, Gpu, GpuOptions};
 pub use error::GpuError;
+pub use frame::Frame;
+pub use grid::{GridGpu, GridOptions};
 pub use recorder::{Answer, Recorder};

@@ -21,9 +21,50 @@ pub const PAIR_BLOCK: u32 = WORKGROUP * PAIR_ITEMS;
 /// Registrations whose pair counts a workgroup keeps at hand while it looks for the pairs of its invocations.
 pub const SEARCH_WINDOW: u32 = 1024;
 
+/// Words of the status that kernels write and the host reads.
+pub mod status {
+    /// Bits of the largest radius (a non-negative `f32`: the order of its bits is its own).
+    pub const RADIUS: u32 = 0;
+    /// Bits that the cell keys have.
+    pub const KEY_BITS: u32 = 1;
+    /// Registrations there are, though there may be room for fewer.
+    pub const REGISTRATIONS: u32 = 2;
+    /// Triangle pairs to test, low word; the high word follows.
+    pub const PAIRS: u32 = 3;
+    /// Triangle pairs whose boxes overlap, in this part of the tests.
+    pub const TRIANGLE_PAIRS: u32 = 5;
+    /// Vertex-triangle candidates, in this part of the tests.
+    pub const VERTEX_TRIANGLE: u32 = 6;
+    /// Edge-edge candidates, in this part of the tests.
+    pub const EDGE_EDGE: u32 = 7;
+    /// Words.
+    pub const LENGTH: u32 = 8;
+}
+
+/// A sphere is registered in the cells that it touches once its radius is multiplied by this: a little more than √2. Of two
+/// spheres that overlap then at least one touches the cell of the other's centre (see `stages/cells.rs`).
+pub const REACH: f32 = 1.4143;
+/// What the rounding of cell planes and distances can add up to, with room: lengths are in units in which the scene lies within
+/// [−1, 1], and a plane's place is off by less than 2⁻¹⁹.
+pub const PLANE_SLACK: f32 = 1.0 / (1 << 17) as f32;
+/// A cell's size in radii of the largest sphere: 1.5 times its diameter.
+pub const CELL_RADII: f32 = 3.0;
+/// Smallest cell.
+pub const MIN_CELL: f32 = 1.0 / (1 << 11) as f32;
+/// Most cells: their numbers and one bit more fit into a key.
+pub const MAX_CELLS: f32 = (1u32 << 30) as f32;
+
 /// The constants as WGSL.
 pub fn shader_prelude() -> String {
-    [
+    let floats = [
+        ("REACH", REACH),
+        ("PLANE_SLACK", PLANE_SLACK),
+        ("CELL_RADII", CELL_RADII),
+        ("MIN_CELL", MIN_CELL),
+        ("MAX_CELLS", MAX_CELLS),
+    ]
+    .map(|(name, value)| format!("const {name} = {value:?}f;\n"));
+    let words = [
         ("WORKGROUP", WORKGROUP),
         ("SCAN_ITEMS", SCAN_ITEMS),
         ("SCAN_BLOCK", SCAN_BLOCK),
@@ -34,7 +75,14 @@ pub fn shader_prelude() -> String {
         ("PAIR_ITEMS", PAIR_ITEMS),
         ("PAIR_BLOCK", PAIR_BLOCK),
         ("SEARCH_WINDOW", SEARCH_WINDOW),
+        ("STATUS_RADIUS", status::RADIUS),
+        ("STATUS_KEY_BITS", status::KEY_BITS),
+        ("STATUS_REGISTRATIONS", status::REGISTRATIONS),
+        ("STATUS_PAIRS", status::PAIRS),
+        ("STATUS_TRIANGLE_PAIRS", status::TRIANGLE_PAIRS),
+        ("STATUS_VERTEX_TRIANGLE", status::VERTEX_TRIANGLE),
+        ("STATUS_EDGE_EDGE", status::EDGE_EDGE),
     ]
-    .map(|(name, value)| format!("const {name} = {value}u;\n"))
-    .concat()
+    .map(|(name, value)| format!("const {name} = {value}u;\n"));
+    words.concat() + &floats.concat()
 }

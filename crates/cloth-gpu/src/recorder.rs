@@ -116,8 +116,8 @@ impl<'a> Recorder<'a> {
         let widest = self.gpu.max_workgroups;
         let rows = groups.div_ceil(widest);
         if rows > widest {
-            self.failed.get_or_insert(GpuError::TooLarge {
-                what: format!("workgroups of {}", kernel.name),
+            self.failed.get_or_insert(GpuError::TooManyWorkgroups {
+                kernel: kernel.name,
                 needed: groups.into(),
                 limit: u64::from(widest) * u64::from(widest),
             });
@@ -177,7 +177,8 @@ impl<'a> Recorder<'a> {
     /// Runs it and waits for what comes back.
     ///
     /// # Errors
-    /// [`GpuError::Timeout`], [`GpuError::Lost`], [`GpuError::Device`], [`GpuError::TooLarge`] for too many workgroups.
+    /// [`GpuError::Timeout`], [`GpuError::Lost`], [`GpuError::Device`], [`GpuError::TooManyWorkgroups`],
+    /// [`GpuError::OutOfMemory`].
     pub fn run(mut self) -> Result<Answer, GpuError> {
         self.pass = None;
         if let Some(error) = self.failed.take() {

@@ -203,7 +203,7 @@ fn too_many_workgroups_are_an_error() {
     );
     let n = 17 * SCAN_BLOCK;
     let refused = scan::<u32>(&device.gpu, &vec![1; n as usize], n, n);
-    assert!(matches!(refused, Err(GpuError::TooLarge { needed: 17, limit: 16, .. })), "{refused:?}");
+    assert!(matches!(refused, Err(GpuError::TooManyWorkgroups { needed: 17, limit: 16, .. })), "{refused:?}");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
+use cloth_gpu::collision::{Body, CollisionMesh, Contacts, Vec3};
 use cloth_gpu::{Gpu, GpuError, GpuOptions};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -64,4 +65,88 @@ impl Random {
     pub(crate) fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
+    pub(crate) fn vector(&mut self, half: f64) -> Vec3 {
+        Vec3::new(self.within(half), self.within(half), self.within(half))
+    }
+}
+
+pub(crate) fn pool(threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+}
+
+/// A wavy n × n sheet of unit size.
+pub(crate) fn sheet(n: usize, random: &mut Random) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let phase = random.within(3.0);
+    let mut vertices = Vec::new();
+    for j in 0..n {
+        for i in 0..n {
+            let (u, v) = (i as f64 / (n - 1) as f64, j as f64 / (n - 1) as f64);
+            vertices.push(Vec3::new(u, 0.2 * (7.0 * u + phase).sin() * (5.0 * v).cos(), v));
+        }
+    }
+    let mut triangles = Vec::new();
+    for j in 0..n as u32 - 1 {
+        for i in 0..n as u32 - 1 {
+            let a = j * n as u32 + i;
+            let (b, c, d) = (a + 1, a + n as u32, a + n as u32 + 1);
+            triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    (vertices, triangles)
+}
+
+/// Loose triangles about a unit cube; some vertices are shared.
+pub(crate) fn soup(count: usize, size: f64, random: &mut Random) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let (mut vertices, mut triangles): (Vec<Vec3>, Vec<[u32; 3]>) = (vec![], vec![]);
+    for _ in 0..count {
+        let centre = random.vector(0.5);
+        let first = vertices.len() as u32;
+        let mut corners = [first, first + 1, first + 2];
+        vertices.extend([(); 3].map(|()| centre + random.vector(size)));
+        if first > 0 && random.below(3) == 0 {
+            corners[0] = random.below(first as usize) as u32;
+        }
+        triangles.push(corners);
+    }
+    (vertices, triangles)
+}
+
+/// Dynamic and static bodies, with and without self-collision, some vertices attached.
+pub(crate) fn bodies(random: &mut Random) -> (CollisionMesh, Vec<Vec3>) {
+    let kinds = [(true, true), (true, false), (false, false), (false, true), (false, false)];
+    let parts: Vec<(Vec<Vec3>, Vec<[u32; 3]>)> = kinds.iter().map(|_| soup(12, 0.3, random)).collect();
+    let list: Vec<(Body, usize, &[[u32; 3]])> = kinds
+        .iter()
+        .zip(&parts)
+        .map(|(&(dynamic, self_collision), (v, t))| (Body { dynamic, self_collision }, v.len(), t.as_slice()))
+        .collect();
+    let mut mesh = CollisionMesh::new(&list).unwrap();
+    for _ in 0..6 {
+        let vertex = random.below(parts[0].0.len()) as u32;
+        mesh.set_attachment(vertex, 1 + random.below(4) as u32);
+    }
+    (mesh, parts.into_iter().flat_map(|p| p.0).collect())
+}
+
+/// None if the contacts are equal, pairs and times; else what differs.
+pub(crate) fn difference(a: &Contacts, b: &Contacts) -> Option<String> {
+    for (what, p, q) in [
+        ("vertex-triangle", &a.vertex_triangle, &b.vertex_triangle),
+        ("edge-edge", &a.edge_edge, &b.edge_edge),
+    ] {
+        if p != q {
+            let only = |p: &Vec<[u32; 2]>, q: &Vec<[u32; 2]>| p.iter().find(|x| !q.contains(x)).copied();
+            return Some(format!(
+                "{what}: {} and {}, only first {:?}, only second {:?}",
+                p.len(),
+                q.len(),
+                only(p, q),
+                only(q, p)
+            ));
+        }
+    }
+    if a.time_vertex_triangle != b.time_vertex_triangle || a.time_edge_edge != b.time_edge_edge {
+        return Some("times".to_owned());
+    }
+    None
 }
