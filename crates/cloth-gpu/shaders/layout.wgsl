@@ -60,3 +60,15 @@ struct Bounds {
     high_1: vec3<f32>,
     pad_high: u32,
 }
+
+// A registration with what its tests ask first.
+struct Entry {
+    centre: vec3<f32>,
+    radius: f32,
+    triangle: u32,
+    // See control.wgsl.
+    control: u32,
+    // 1: the cell is not the triangle's home.
+    is_guest: u32,
+    pad: u32,
+}

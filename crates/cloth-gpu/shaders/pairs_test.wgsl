@@ -1,27 +1,39 @@
 // The triangle pairs of the cells: one test per invocation and turn, whatever cell it comes from (thesis 5.3.4). The workgroup
 // finds the registrations of its first and last test by binary search in the sums, keeps the sums between at hand, and
-// each invocation finds its own registration in those.
+// each invocation finds its own registration in those. Spheres come first; the few pairs that pass are shared out anew over
+// the invocations for the rest.
 //   in   sums[r]        r ≤ n   tests before registration r, as (low, high)
-//        keys, registered [r]   sorted; controls[t], bounds[t]
+//        entries[r]             by cell; bounds[t]
 //   out  pairs[p]       p < status[STATUS_TRIANGLE_PAIRS]: unordered; what does not fit is counted and left out
 //        status         also: registrations and tests there are
 // Includes: layout, boxes, control.   Twin: src/twin/pairs.rs
 @group(0) @binding(0) var<uniform> params: PairParams;
 @group(0) @binding(1) var<storage, read> lengths: array<u32>;
 @group(0) @binding(2) var<storage, read> sums: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read> keys: array<u32>;
-@group(0) @binding(4) var<storage, read> registered: array<u32>;
-@group(0) @binding(5) var<storage, read> controls: array<u32>;
-@group(0) @binding(6) var<storage, read> bounds: array<Bounds>;
-@group(0) @binding(7) var<storage, read_write> pairs: array<vec2<u32>>;
-@group(0) @binding(8) var<storage, read_write> status: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read> entries: array<Entry>;
+@group(0) @binding(4) var<storage, read> bounds: array<Bounds>;
+@group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read_write> status: array<atomic<u32>>;
 
 // Registrations of the workgroup's first and last test.
 var<workgroup> sh_ends: array<u32, 2>;
 // Tests before each registration from the first to the last, counted from the workgroup's first test.
 var<workgroup> sh_window: array<u32, SEARCH_WINDOW>;
+// Tests whose spheres touch.
+var<workgroup> sh_near: array<u32, PAIR_BLOCK>;
+var<workgroup> sh_near_count: atomic<u32>;
 var<workgroup> sh_count: atomic<u32>;
 var<workgroup> sh_base: u32;
+
+// The tests of the workgroup, and the registrations that they begin with.
+struct Share {
+    begin: vec2<u32>,
+    size: u32,
+    first: u32,
+    last: u32,
+    // Tests of the first registration that belong to earlier workgroups.
+    skipped: u32,
+}
 
 fn is_at_most(a: vec2<u32>, b: vec2<u32>) -> bool {
     return a.y < b.y || (a.y == b.y && a.x <= b.x);
@@ -43,13 +55,41 @@ fn find(test: vec2<u32>, first: u32, past: u32) -> u32 {
     return low;
 }
 
+// The registrations of a test: who begins it, and the partner.
+fn locate(share: Share, test: u32) -> vec2<u32> {
+    if share.last - share.first < SEARCH_WINDOW {
+        var low = 0u;
+        var high = share.last - share.first + 1u;
+        while high - low > 1u {
+            let middle = low + (high - low) / 2u;
+            if sh_window[middle] <= test { low = middle; } else { high = middle; }
+        }
+        let r = share.first + low;
+        return vec2<u32>(r, r + 1u + test + select(0u - sh_window[low], share.skipped, low == 0u));
+    }
+    let r = find(plus(share.begin, test), share.first, share.last + 1u);
+    return vec2<u32>(r, r + 1u + (share.begin.x + test - sums[r].x));
+}
+
 fn bodies_meet(a: u32, b: u32) -> bool {
     if (a >> 2u) == (b >> 2u) { return (a & 1u) != 0u; }
     return ((a | b) & 2u) != 0u;
 }
 
-fn passes(a: u32, b: u32, is_guest: bool) -> bool {
-    if is_guest && is_left_to_other_cell(controls[a], controls[b]) { return false; }
+// The factor covers the rounding of both sides.
+fn spheres_touch(pair: vec2<u32>) -> bool {
+    let between = entries[pair.x].centre - entries[pair.y].centre;
+    let reach = entries[pair.x].radius + entries[pair.y].radius;
+    return dot(between, between) <= reach * reach * 1.00001;
+}
+
+// Whether the pair is tested in this cell and not in the home of the second.
+fn is_here(pair: vec2<u32>) -> bool {
+    return entries[pair.y].is_guest == 0u
+        || !is_left_to_other_cell(entries[pair.x].control, entries[pair.y].control);
+}
+
+fn boxes_touch(a: u32, b: u32) -> bool {
     let first = bounds[a];
     let second = bounds[b];
     if (first.is_active | second.is_active) == 0u || !bodies_meet(first.body, second.body) { return false; }
@@ -85,56 +125,56 @@ fn pairs_test(
     if index < 2u && size > 0u {
         sh_ends[index] = find(plus(begin, index * (size - 1u)), 0u, n);
     }
-    if index == 0u { atomicStore(&sh_count, 0u); }
-    workgroupBarrier();
-    var first = 0u;
-    var last = 0u;
-    if size > 0u {
-        first = sh_ends[0];
-        last = sh_ends[1];
+    if index == 0u {
+        atomicStore(&sh_near_count, 0u);
+        atomicStore(&sh_count, 0u);
     }
-    let is_near = last - first < SEARCH_WINDOW;
-    if is_near && size > 0u {
-        for (var k = index; k <= last - first; k += WORKGROUP) {
-            // Only the first one's tests may begin before the workgroup's.
-            sh_window[k] = select(sums[first + k].x - begin.x, 0u, k == 0u);
+    workgroupBarrier();
+    var share = Share(begin, size, 0u, 0u, 0u);
+    if size > 0u {
+        share.first = sh_ends[0];
+        share.last = sh_ends[1];
+        share.skipped = begin.x - sums[share.first].x;
+        if share.last - share.first < SEARCH_WINDOW {
+            for (var k = index + 1u; k <= share.last - share.first; k += WORKGROUP) {
+                sh_window[k] = sums[share.first + k].x - begin.x;
+            }
+            if index == 0u { sh_window[0] = 0u; }
         }
     }
     workgroupBarrier();
 
-    var found: array<vec2<u32>, PAIR_ITEMS>;
-    var hits = 0u;
+    // Bit per turn.
+    var near = 0u;
     for (var turn = 0u; turn < PAIR_ITEMS; turn++) {
         let test = turn * WORKGROUP + index;
-        if test < size {
-            var r = first;
-            if is_near {
-                var low = 0u;
-                var high = last - first + 1u;
-                while high - low > 1u {
-                    let middle = low + (high - low) / 2u;
-                    if sh_window[middle] <= test { low = middle; } else { high = middle; }
-                }
-                r = first + low;
-            } else {
-                r = find(plus(begin, test), first, last + 1u);
-            }
-            let partner = r + 1u + (begin.x + test - sums[r].x);
-            let a = registered[r];
-            let b = registered[partner];
-            if passes(a, b, (keys[partner] & 1u) != 0u) {
-                found[hits] = vec2<u32>(a, b);
-                hits++;
-            }
+        if test < size && spheres_touch(locate(share, test)) { near |= 1u << turn; }
+    }
+    var slot = atomicAdd(&sh_near_count, countOneBits(near));
+    for (; near != 0u; near &= near - 1u) {
+        sh_near[slot] = firstTrailingBit(near) * WORKGROUP + index;
+        slot++;
+    }
+    workgroupBarrier();
+    let near_count = atomicLoad(&sh_near_count);
+    var hits = 0u;
+    for (var turn = 0u; turn * WORKGROUP < near_count; turn++) {
+        let k = turn * WORKGROUP + index;
+        if k < near_count {
+            let pair = locate(share, sh_near[k]);
+            if is_here(pair) && boxes_touch(entries[pair.x].triangle, entries[pair.y].triangle) { hits |= 1u << turn; }
         }
     }
-    var place = 0u;
-    if hits > 0u { place = atomicAdd(&sh_count, hits); }
+    var place = atomicAdd(&sh_count, countOneBits(hits));
     workgroupBarrier();
     if index == 0u { sh_base = atomicAdd(&status[STATUS_TRIANGLE_PAIRS], atomicLoad(&sh_count)); }
     workgroupBarrier();
     place += sh_base;
-    for (var k = 0u; k < hits; k++) {
-        if place + k < arrayLength(&pairs) { pairs[place + k] = found[k]; }
+    for (; hits != 0u; hits &= hits - 1u) {
+        let pair = locate(share, sh_near[firstTrailingBit(hits) * WORKGROUP + index]);
+        if place < arrayLength(&pairs) {
+            pairs[place] = vec2<u32>(entries[pair.x].triangle, entries[pair.y].triangle);
+        }
+        place++;
     }
 }

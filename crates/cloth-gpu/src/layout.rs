@@ -95,3 +95,21 @@ pub struct Bounds {
     /// Unused.
     pub pad_high: u32,
 }
+
+/// A registration with what its tests ask first.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Entry {
+    /// Centre of the triangle's sphere.
+    pub centre: [f32; 3],
+    /// Its radius.
+    pub radius: f32,
+    /// The triangle.
+    pub triangle: u32,
+    /// Its control bits: see `control.wgsl`.
+    pub control: u32,
+    /// 1: the cell is not the triangle's home.
+    pub is_guest: u32,
+    /// Unused.
+    pub pad: u32,
+}

@@ -14,8 +14,8 @@ pub const SORT_BLOCK: u32 = WORKGROUP * SORT_ITEMS;
 pub const DIGIT_BITS: u32 = 4;
 /// Values of a digit.
 pub const RADIX: u32 = 1 << DIGIT_BITS;
-/// Triangle pairs that one invocation tests.
-pub const PAIR_ITEMS: u32 = 4;
+/// Triangle pairs that one invocation tests: at most 32, one bit each.
+pub const PAIR_ITEMS: u32 = 8;
 /// Triangle pairs that one workgroup tests.
 pub const PAIR_BLOCK: u32 = WORKGROUP * PAIR_ITEMS;
 /// Registrations whose pair counts a workgroup keeps at hand while it looks for the pairs of its invocations.

@@ -19,7 +19,7 @@ use crate::buffers::Array;
 use crate::context::Gpu;
 use crate::error::GpuError;
 use crate::kernel::{Kernel, Source};
-use crate::layout::{Grid, SceneParams};
+use crate::layout::{Entry, Grid, LengthParams, SceneParams};
 use crate::limits::WORKGROUP;
 use crate::recorder::Recorder;
 use crate::stages::bounds::Scene;
@@ -34,6 +34,7 @@ pub struct Cells {
     setup: Arc<Kernel>,
     count: Arc<Kernel>,
     register: Arc<Kernel>,
+    gather: Arc<Kernel>,
     scan: Scan<u32>,
     sort: Sort,
     triangles: u32,
@@ -44,15 +45,17 @@ pub struct Cells {
     pub(crate) offsets: Array<u32>,
     pub(crate) keys: Array<u32>,
     pub(crate) registered: Array<u32>,
+    pub(crate) entries: Array<Entry>,
 }
 
-/// The texts of the kernels: setup, count, register.
-pub fn sources() -> [Source; 3] {
+/// The texts of the kernels: setup, count, register, gather.
+pub fn sources() -> [Source; 4] {
     [
         Source::new("grid_setup", include_str!("../../shaders/grid_setup.wgsl")),
         Source::new("cells_count", include_str!("../../shaders/cells_count.wgsl")),
         Source::new("cells_register", include_str!("../../shaders/cells_register.wgsl"))
             .include(include_str!("../../shaders/control.wgsl")),
+        Source::new("cells_gather", include_str!("../../shaders/cells_gather.wgsl")),
     ]
 }
 
@@ -62,12 +65,13 @@ impl Cells {
     /// # Errors
     /// [`GpuError::Shader`], [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
     pub fn new(gpu: &Gpu, triangles: u32, capacity: usize) -> Result<Self, GpuError> {
-        let [setup, count, register] = sources();
+        let [setup, count, register, gather] = sources();
         let n = triangles as usize;
         Ok(Self {
             setup: setup.kernel(gpu)?,
             count: count.kernel(gpu)?,
             register: register.kernel(gpu)?,
+            gather: gather.kernel(gpu)?,
             scan: Scan::new(gpu)?,
             sort: Sort::new(gpu)?,
             triangles,
@@ -78,6 +82,7 @@ impl Cells {
             offsets: Array::new(gpu, "first registrations", n + 1)?,
             keys: Array::new(gpu, "cell keys", capacity)?,
             registered: Array::new(gpu, "registered triangles", capacity)?,
+            entries: Array::new(gpu, "registrations by cell", capacity)?,
         })
     }
 
@@ -87,7 +92,8 @@ impl Cells {
     /// [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
     pub fn grow(&mut self, gpu: &Gpu, needed: usize) -> Result<(), GpuError> {
         self.keys.grow(gpu, needed)?;
-        self.registered.grow(gpu, needed)
+        self.registered.grow(gpu, needed)?;
+        self.entries.grow(gpu, needed)
     }
 
     /// How many registrations there are, bounded by the room.
@@ -125,7 +131,18 @@ impl Cells {
         recorder.stage("sort");
         let most = self.keys.capacity() as u32;
         let length = Length::device(most, &self.offsets, self.triangles);
-        self.sort.record(recorder, &self.keys, &self.registered, length, key_bits)
+        self.sort.record(recorder, &self.keys, &self.registered, length, key_bits)?;
+        let params = LengthParams { most, word: self.triangles, ..Default::default() };
+        let arrays = [
+            &self.offsets.raw,
+            &self.keys.raw,
+            &self.registered.raw,
+            &scene.spheres.raw,
+            &self.controls.raw,
+            &self.entries.raw,
+        ];
+        recorder.dispatch(&self.gather, &params, &arrays, most.div_ceil(WORKGROUP));
+        Ok(())
     }
 
     /// Memory [B].
@@ -133,7 +150,8 @@ impl Cells {
         [&self.homes, &self.controls, &self.counts, &self.offsets, &self.keys, &self.registered]
             .map(Array::bytes)
             .iter()
-            .sum()
+            .sum::<u64>()
+            + self.entries.bytes()
     }
 }
 

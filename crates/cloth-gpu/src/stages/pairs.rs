@@ -88,9 +88,7 @@ impl Pairs {
         let arrays = [
             n.buffer(recorder.gpu()),
             &self.sums.raw,
-            &cells.keys.raw,
-            &cells.registered.raw,
-            &cells.controls.raw,
+            &cells.entries.raw,
             &scene.bounds.raw,
             &self.found.raw,
             &scene.status.raw,

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
+pub(crate) mod npz;
+
 use cloth_gpu::collision::{Body, CollisionMesh, Contacts, Vec3};
 use cloth_gpu::{Gpu, GpuError, GpuOptions};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
