@@ -5,7 +5,7 @@ use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, NarrowPha
 use crate::context::Gpu;
 use crate::error::GpuError;
 use crate::frame::Frame;
-use crate::limits::{PAIR_BLOCK, status};
+use crate::limits::{PAIR_BLOCK, WORKGROUP, status};
 use crate::recorder::{Answer, Recorder};
 use crate::stages::bounds::Scene;
 use crate::stages::cells::{Cells, key_bits};
@@ -106,7 +106,9 @@ impl GridGpu {
     /// As [`GridGpu::new`].
     pub fn with_options(gpu: Arc<Gpu>, mesh: &CollisionMesh, options: GridOptions) -> Result<Self, GpuError> {
         let n = mesh.triangles.len();
-        let most = Array::<[u32; 2]>::most(&gpu).min(MAX_CAPACITY);
+        // One invocation per triangle pair.
+        let invocations = u64::from(gpu.max_workgroups).pow(2) * u64::from(WORKGROUP);
+        let most = Array::<[u32; 2]>::most(&gpu).min(MAX_CAPACITY).min(invocations as usize);
         let max_capacity = options.max_capacity.map_or(most, |m| most.min(m as usize)).max(16);
         let room = |per_triangle: usize| options.first_capacity.map_or(per_triangle * n, |c| c as usize);
         let per_submission = options.max_tests.unwrap_or(if gpu.is_software() { 1 << 24 } else { 1 << 28 });

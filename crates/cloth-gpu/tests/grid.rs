@@ -4,7 +4,8 @@
 mod support;
 
 use cloth_gpu::collision::{BruteForce, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
-use cloth_gpu::{Gpu, GpuOptions, GridGpu, GridOptions};
+use cloth_gpu::twin::grid::GridTwin;
+use cloth_gpu::{Frame, Gpu, GpuOptions, GridGpu, GridOptions};
 use std::sync::Arc;
 use support::{Random, bodies, device, difference, pool, sheet, soup, variants};
 
@@ -234,6 +235,31 @@ fn bad_input_is_named() {
     ));
     let none = GridGpu::new(device.gpu.clone(), &empty).unwrap().detect(&empty, &good, &pool(1)).unwrap();
     assert_eq!(none, Contacts::default());
+}
+
+/// The method itself, without a device.
+#[test]
+fn the_twin_agrees_and_needs_its_reach() {
+    let mut lost = 0;
+    for seed in 0..12 {
+        let mut random = Random(70 + seed);
+        let (x_t0, triangles) = soup(300, 0.1, &mut random);
+        let triangles: Vec<[u32; 3]> = triangles.into_iter().filter(|t| t[0] + 2 == t[2]).collect();
+        let x_t1 = moved(&x_t0, 0.02, &mut random);
+        let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+        for mode in [Mode::Continuous, Mode::Discrete] {
+            let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.001, mode, active: None };
+            let expected = BruteForce.detect(&mesh, &query, &pool(1)).unwrap();
+            let got = GridTwin::default().detect(&mesh, &query, &pool(1)).unwrap();
+            assert_eq!(difference(&expected, &got), None, "{seed}, {mode:?}");
+            let (frame, count) = (Frame::new(&query, &pool(1)), |t: GridTwin, f: &Frame| {
+                let (vertex_triangle, edge_edge, _) = t.candidates(&mesh, &query, f);
+                vertex_triangle.len() + edge_edge.len()
+            });
+            lost += count(GridTwin::default(), &frame) - count(GridTwin { reach: 0.8 }, &frame);
+        }
+    }
+    assert!(lost > 0, "too short a reach must show");
 }
 
 #[test]

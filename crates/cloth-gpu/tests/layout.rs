@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use cloth_gpu::kernel::Source;
-use cloth_gpu::layout::LengthParams;
-use cloth_gpu::stages::{compact, scan, sort};
+use cloth_gpu::layout::{Bounds, Entry, Grid, LengthParams, PairParams, SceneParams};
+use cloth_gpu::stages::{bounds, cells, compact, features, pairs, scan, sort};
 use std::mem::offset_of;
 
 /// Name, offset and size of each member, and the struct's size.
@@ -30,7 +30,14 @@ macro_rules! layout {
 
 #[test]
 fn layouts_are_equal() {
-    for (name, host) in [layout!(LengthParams { most, word, shift, extra })] {
+    for (name, host) in [
+        layout!(LengthParams { most, word, shift, extra }),
+        layout!(SceneParams { triangles, second, all_active, pad, low, pad_low, high, pad_high }),
+        layout!(Grid { low, size, cells, inverse }),
+        layout!(PairParams { most, word, start_low, start_high, count, pad_0, pad_1, pad_2 }),
+        layout!(Bounds { low_0, is_active, high_0, body, low_1, pad_low, high_1, pad_high }),
+        layout!(Entry { centre, radius, triangle, control, is_guest, pad }),
+    ] {
         assert_eq!(host, layout_in_wgsl(name), "{name}");
     }
 }
@@ -42,7 +49,9 @@ fn swapped_members_are_noticed() {
 }
 
 fn all_sources() -> Vec<Source> {
-    let mut all = vec![compact::source()];
+    let mut all = vec![compact::source(), bounds::source(), features::source()];
+    all.extend(cells::sources());
+    all.extend(pairs::sources());
     for flag in [false, true] {
         for subgroups in [false, true] {
             all.extend(scan::sources::<u32>(subgroups, flag));

@@ -1,6 +1,6 @@
 //! The published scenes: the contacts of the grid are those of the tree on the CPU.
 #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
-#![allow(clippy::print_stderr, reason = "a skipped test says so")]
+#![allow(clippy::print_stderr, clippy::print_stdout, reason = "a skipped test says so, a run its times")]
 
 mod support;
 
@@ -31,7 +31,7 @@ fn scene(name: &str) -> Option<Scene> {
 }
 
 fn agrees(name: &str, modes: &[Mode]) {
-    let Some(device) = device(GpuOptions { shader_checks: false, ..GpuOptions::default() }) else { return };
+    let Some(device) = device(GpuOptions::default()) else { return };
     let Some(Scene { x_t0, x_t1, triangles }) = scene(name) else { return };
     let pool = pool(2);
     let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
@@ -43,8 +43,13 @@ fn agrees(name: &str, modes: &[Mode]) {
         for turn in ["first", "again"] {
             let clock = Instant::now();
             let got = grid.detect(&mesh, &query, &pool).unwrap();
-            println!("{name}, {mode:?}, {turn}: {:.2} s, {} registrations, {} MiB, {:?}",
-                clock.elapsed().as_secs_f64(), grid.registrations(), grid.bytes() >> 20, got.stats);
+            println!(
+                "{name}, {mode:?}, {turn}: {:.2} s, {} registrations, {} MiB, {:?}",
+                clock.elapsed().as_secs_f64(),
+                grid.registrations(),
+                grid.bytes() >> 20,
+                got.stats
+            );
             assert_eq!(difference(&expected, &got), None, "{name}, {mode:?}, {turn}");
         }
         assert!(!expected.edge_edge.is_empty() || mode == Mode::Discrete);
@@ -53,7 +58,7 @@ fn agrees(name: &str, modes: &[Mode]) {
 
 #[test]
 fn cloth_ball_agrees() {
-    agrees("cloth-ball", &[Mode::Continuous, Mode::Discrete]);
+    agrees("cloth-ball", &[Mode::Continuous]);
 }
 
 #[test]

@@ -14,14 +14,22 @@ use std::sync::Arc;
 /// A scene on the device: its topology, written once, and what each query brings.
 #[derive(Debug)]
 pub struct Scene {
-    pub(crate) params: SceneParams,
-    pub(crate) triangles: Array<[u32; 4]>,
-    pub(crate) features: Array<[u32; 4]>,
-    pub(crate) positions: Array<[f32; 4]>,
-    pub(crate) active: Array<u32>,
-    pub(crate) bounds: Array<Bounds>,
-    pub(crate) spheres: Array<[f32; 4]>,
-    pub(crate) status: Array<u32>,
+    /// What the kernels of the scene are told.
+    pub params: SceneParams,
+    /// See [`triangle_words`].
+    pub triangles: Array<[u32; 4]>,
+    /// See [`feature_words`].
+    pub features: Array<[u32; 4]>,
+    /// See [`Frame::positions`].
+    pub positions: Array<[f32; 4]>,
+    /// See [`active_words`].
+    pub active: Array<u32>,
+    /// Boxes of the triangles.
+    pub bounds: Array<Bounds>,
+    /// Spheres of the triangles: centre, radius.
+    pub spheres: Array<[f32; 4]>,
+    /// Words of [`status`].
+    pub status: Array<u32>,
     kernel: Arc<Kernel>,
 }
 

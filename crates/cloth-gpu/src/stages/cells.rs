@@ -38,14 +38,22 @@ pub struct Cells {
     scan: Scan<u32>,
     sort: Sort,
     triangles: u32,
-    pub(crate) grid: Array<Grid>,
-    pub(crate) homes: Array<u32>,
-    pub(crate) controls: Array<u32>,
-    pub(crate) counts: Array<u32>,
-    pub(crate) offsets: Array<u32>,
-    pub(crate) keys: Array<u32>,
-    pub(crate) registered: Array<u32>,
-    pub(crate) entries: Array<Entry>,
+    /// The cells: one element.
+    pub grid: Array<Grid>,
+    /// Home cell of each triangle.
+    pub homes: Array<u32>,
+    /// Control bits of each triangle.
+    pub controls: Array<u32>,
+    /// Cells of each triangle.
+    pub counts: Array<u32>,
+    /// First registration of each triangle, and their number.
+    pub offsets: Array<u32>,
+    /// Keys of the registrations, sorted.
+    pub keys: Array<u32>,
+    /// Triangles of the registrations.
+    pub registered: Array<u32>,
+    /// The registrations with what their tests ask first.
+    pub entries: Array<Entry>,
 }
 
 /// The texts of the kernels: setup, count, register, gather.

@@ -13,8 +13,10 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Features {
     kernel: Arc<Kernel>,
-    pub(crate) vertex_triangle: Array<[u32; 2]>,
-    pub(crate) edge_edge: Array<[u32; 2]>,
+    /// Candidates (vertex, triangle), unordered.
+    pub vertex_triangle: Array<[u32; 2]>,
+    /// Candidates (edge, edge), unordered.
+    pub edge_edge: Array<[u32; 2]>,
 }
 
 /// The kernel's text.

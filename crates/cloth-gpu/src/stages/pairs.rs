@@ -18,9 +18,12 @@ pub struct Pairs {
     count: Arc<Kernel>,
     test: Arc<Kernel>,
     scan: Scan<[u32; 2]>,
-    pub(crate) counts: Array<u32>,
-    pub(crate) sums: Array<[u32; 2]>,
-    pub(crate) found: Array<[u32; 2]>,
+    /// Tests that each registration begins.
+    pub counts: Array<u32>,
+    /// Tests before each registration, (low, high), and their number.
+    pub sums: Array<[u32; 2]>,
+    /// Triangle pairs that passed, unordered.
+    pub found: Array<[u32; 2]>,
 }
 
 /// The texts of both kernels: count, test.

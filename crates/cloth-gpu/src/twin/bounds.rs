@@ -71,7 +71,8 @@ pub fn triangle_bounds(
         bounds.push(Bounds { low_0, is_active, high_0, body, low_1, high_1, ..Default::default() });
 
         let centre = [0, 1, 2].map(|k| 0.5 * (low_0[k].min(low_1[k]) + high_0[k].max(high_1[k])));
-        let length = |p: [f32; 4]| (0..3).map(|k| (p[k] - centre[k]) * (p[k] - centre[k])).sum::<f32>().sqrt();
+        let length =
+            |p: [f32; 4]| (0..3).map(|k| (p[k] - centre[k]) * (p[k] - centre[k])).sum::<f32>().sqrt();
         let (mut distance, mut reach) = (0.0f32, 0.0f32);
         for v in [a, b, c] {
             let (p, q) = ends(v);

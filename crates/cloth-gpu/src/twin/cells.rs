@@ -122,7 +122,9 @@ mod tests {
             (state >> 40) as f32 / (1u32 << 24) as f32
         };
         let spheres = (0..n)
-            .map(|_| [2.0 * unit() - 1.0, 1.4 * unit() - 0.7, 0.6 * unit() - 0.3, radius * (1.0 - 0.2 * unit())])
+            .map(|_| {
+                [2.0 * unit() - 1.0, 1.4 * unit() - 0.7, 0.6 * unit() - 0.3, radius * (1.0 - 0.2 * unit())]
+            })
             .collect();
         (grid_setup(&params, radius).0, spheres)
     }

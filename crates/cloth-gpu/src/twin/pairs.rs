@@ -72,7 +72,8 @@ mod tests {
 
     #[test]
     fn parts_make_the_whole() {
-        let entry = |k: u32| Entry { centre: [k as f32, 0.0, 0.0], radius: 1.0, triangle: k, ..Default::default() };
+        let entry =
+            |k: u32| Entry { centre: [k as f32, 0.0, 0.0], radius: 1.0, triangle: k, ..Default::default() };
         let entries: Vec<Entry> = (0..20).map(entry).collect();
         let bounds = vec![Bounds { is_active: 1, body: 3, ..Default::default() }; 20];
         let counts = pairs_count(&[0; 20]);
