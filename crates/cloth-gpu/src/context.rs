@@ -206,6 +206,11 @@ impl Gpu {
         self.max_binding
     }
 
+    /// Closes the device: every later call on it fails with [`GpuError::Lost`], as if the driver had gone.
+    pub fn close(&self) {
+        self.device.destroy();
+    }
+
     /// What went wrong since the last call, if anything did. A lost device stays lost.
     pub(crate) fn failure(&self) -> Result<(), GpuError> {
         let mut failure = lock(&self.failure);
@@ -244,7 +249,12 @@ impl Gpu {
                 self.failure()?;
                 Err(GpuError::Timeout { seconds: timeout.as_secs_f64() })
             }
-            Err(error) => Err(GpuError::Device { message: error.to_string() }),
+            Err(error) => {
+                // A device that is gone takes no submission, so there is none to wait for: the cause comes by itself.
+                let _ = self.device.poll(wgpu::PollType::Poll);
+                self.failure()?;
+                Err(GpuError::Device { message: error.to_string() })
+            }
         }
     }
 }

@@ -50,6 +50,8 @@ pub struct GridGpu {
     key_bits: u32,
     portion: u32,
     expected: [usize; 2],
+    /// Triangle pairs whose features are looked at, at most the room for them.
+    pair_room: usize,
     registrations: u64,
 }
 
@@ -128,6 +130,7 @@ impl GridGpu {
                 .clamp(u64::from(PAIR_BLOCK).min(max_tests.into()), max_tests.into())
                 as u32,
             expected: [0, 0],
+            pair_room: room(8).clamp(1, max_capacity),
             registrations: 0,
             gpu,
         })
@@ -156,7 +159,7 @@ impl GridGpu {
             recorder.clear(&self.scene.status, first..u64::from(status::LENGTH));
         }
         self.pairs.record_tests(&mut recorder, &self.scene, &self.cells, start, count);
-        self.features.record(&mut recorder, &self.scene, &self.pairs.found);
+        self.features.record(&mut recorder, &self.scene, &self.pairs.found, self.pair_room as u32);
         let words = recorder.download(&self.scene.status, 0..status::LENGTH as usize);
         let lists = [&self.features.vertex_triangle, &self.features.edge_edge];
         for (list, expected) in lists.into_iter().zip(self.expected) {
@@ -191,6 +194,13 @@ impl GridGpu {
                 next = Some(next.map_or(smaller, |n: u32| n.min(smaller)));
             }
         }
+        // More pairs than were looked at, though they are there: once more.
+        if counts.triangle_pairs > self.pair_room {
+            next = next.or(Some(portion));
+        }
+        // A quarter more than this time, in case of more next time.
+        let wanted = counts.triangle_pairs + counts.triangle_pairs / 4 + WORKGROUP as usize;
+        self.pair_room = wanted.min(self.pairs.found.capacity());
         Ok(next)
     }
 

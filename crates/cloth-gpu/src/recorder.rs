@@ -184,8 +184,9 @@ impl<'a> Recorder<'a> {
         if let Some(error) = self.failed.take() {
             return Err(error);
         }
-        self.write_params();
         let gpu = self.gpu;
+        gpu.failure()?;
+        self.write_params();
         let measured = (self.stages.len() as u32).min(MAX_STAGES);
         if let Some((set, resolved)) = self.queries.as_ref().filter(|_| measured > 0) {
             self.encoder.resolve_query_set(set, 0..2 * measured, resolved, 0);

@@ -237,6 +237,30 @@ fn bad_input_is_named() {
     assert_eq!(none, Contacts::default());
 }
 
+#[test]
+fn a_lost_device_is_an_error_and_a_new_one_works() {
+    let Some(lost) = device(GpuOptions::default()) else { return };
+    let mut random = Random(11);
+    let (x, triangles) = soup(50, 0.3, &mut random);
+    let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
+    let query = Query { x_t0: &x, x_t1: &x, thickness: 0.0, mode: Mode::Continuous, active: None };
+    let mut grid = GridGpu::new(lost.gpu.clone(), &mesh).unwrap();
+    let before = grid.detect(&mesh, &query, &pool(1)).unwrap();
+    lost.gpu.close();
+    for _ in 0..2 {
+        match grid.detect(&mesh, &query, &pool(1)) {
+            Err(DetectError::Device { detector: "grid", reason }) => {
+                assert!(reason.contains("lost"), "{reason}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+    drop(lost);
+    let Some(device) = device(GpuOptions::default()) else { return };
+    let after = GridGpu::new(device.gpu.clone(), &mesh).unwrap().detect(&mesh, &query, &pool(1)).unwrap();
+    assert_eq!(difference(&before, &after), None);
+}
+
 /// The method itself, without a device.
 #[test]
 fn the_twin_agrees_and_needs_its_reach() {

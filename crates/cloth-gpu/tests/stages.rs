@@ -43,6 +43,16 @@ struct Run {
     edge_edge: Vec<[u32; 2]>,
 }
 
+fn whole<T: Pod>(recorder: &mut Recorder<'_>, array: &Array<T>) -> usize {
+    recorder.download(array, 0..array.capacity())
+}
+
+fn first<T>(mut list: Vec<T>, n: usize) -> Vec<T> {
+    assert!(n <= list.len(), "{n} in {}", list.len());
+    list.truncate(n);
+    list
+}
+
 /// With room for so many pairs and candidates, and for eight times as many tests.
 fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> Run {
     let frame = Frame::new(query, &pool(1));
@@ -58,10 +68,7 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> Run {
     cells.record(&mut recorder, &scene, 32).unwrap();
     pairs.record_counts(&mut recorder, &cells).unwrap();
     pairs.record_tests(&mut recorder, &scene, &cells, 0, tests);
-    features.record(&mut recorder, &scene, &pairs.found);
-    fn whole<T: Pod>(recorder: &mut Recorder<'_>, array: &Array<T>) -> usize {
-        recorder.download(array, 0..array.capacity())
-    }
+    features.record(&mut recorder, &scene, &pairs.found, room as u32);
     let r = &mut recorder;
     let copies = [
         whole(r, &scene.bounds),
@@ -84,11 +91,6 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> Run {
     let words: Vec<u32> = answer.read(copies[2]);
     let count = |k: u32| words[k as usize] as usize;
     assert!(count(status::PAIRS) < tests as usize && count(status::PAIRS + 1) == 0, "all tests in one part");
-    fn first<T>(mut list: Vec<T>, n: usize) -> Vec<T> {
-        assert!(n <= list.len(), "{n} in {}", list.len());
-        list.truncate(n);
-        list
-    }
     let registrations = count(status::REGISTRATIONS);
     Run {
         params: scene.params,
@@ -251,6 +253,8 @@ fn many_triangles_match_their_twins() {
     assert_eq!(difference(&run(&device.gpu, &mesh, &query, 16 * ROOM)), None);
 }
 
+type Fault = fn(&mut Run);
+
 #[test]
 fn planted_faults_are_caught() {
     let Some(device) = device(variants()[0]) else { return };
@@ -258,7 +262,6 @@ fn planted_faults_are_caught() {
     let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
     let good = run(&device.gpu, &mesh, &query, ROOM);
     assert_eq!(difference(&good), None);
-    type Fault = fn(&mut Run);
     let faults: [(&str, Fault); 16] = [
         ("bounds", |r| r.bounds[99].low_1[2] = r.bounds[99].low_1[2].next_up()),
         ("bounds", |r| r.bounds[7].is_active ^= 1),

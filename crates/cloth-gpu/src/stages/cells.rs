@@ -3,7 +3,7 @@
 //! A cell is 1.5 times the largest sphere's diameter (3 radii; thesis 3.3.1). A triangle is registered in its home cell, which
 //! holds its sphere's centre, and in the cells that the sphere touches once its radius is multiplied by √2.
 //!
-//! **Why √2.** Tests are begun only where one triangle of the pair is at home (thesis 3.3.1, after Le Grand 2007). Let the
+//! **Why √2.** Tests are begun only where one triangle of the pair is at home (thesis 3.3.1). Let the
 //! spheres (a, r) and (b, s) overlap, with homes A ≠ B. Along each axis in which A and B differ there is one cell plane between a and
 //! b, at distances d from a and e from b, so |a − b|² ≥ Σ (d + e)² ≥ Σ d² + Σ e² = dist(a, B)² + dist(b, A)². If a were not
 //! registered in B nor b in A, that would exceed 2 r² + 2 s² ≥ (r + s)²: no overlap. With the plain radius the claim is false (two
@@ -13,7 +13,7 @@
 //! home cells are among A and B. The control bits tell exactly whether both meet in the other one (`control.wgsl`); then the cell of
 //! the lower type has the test.
 //!
-//! Source: Le Grand, Broad-Phase Collision Detection with CUDA, GPU Gems 3, 2007, which scales spheres by √2 too.
+//! Sources: \[wong2014\] 3.3.1; \[legrand2007\], which scales spheres by √2 too.
 
 use crate::buffers::Array;
 use crate::context::Gpu;

@@ -38,8 +38,9 @@ impl Features {
         })
     }
 
-    /// Records the candidates of the pairs that the status counts, as far as `pairs` holds them.
-    pub fn record(&self, recorder: &mut Recorder<'_>, scene: &Scene, pairs: &Array<[u32; 2]>) {
+    /// Records the candidates of the pairs that the status counts, as far as `pairs` holds them; of at least `most` where there
+    /// are so many.
+    pub fn record(&self, recorder: &mut Recorder<'_>, scene: &Scene, pairs: &Array<[u32; 2]>, most: u32) {
         recorder.stage("feature pairs");
         let arrays = [
             &scene.triangles.raw,
@@ -51,12 +52,7 @@ impl Features {
             &self.edge_edge.raw,
             &scene.status.raw,
         ];
-        recorder.dispatch(
-            &self.kernel,
-            &scene.params,
-            &arrays,
-            (pairs.capacity() as u32).div_ceil(WORKGROUP),
-        );
+        recorder.dispatch(&self.kernel, &scene.params, &arrays, most.div_ceil(WORKGROUP));
     }
 
     /// Memory [B].

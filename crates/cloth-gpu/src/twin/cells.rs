@@ -134,7 +134,9 @@ mod tests {
         let n = spheres.len();
         let (homes, mut controls) = cells_count(grid, spheres, reach);
         let registrations = cells_register(grid, &homes, &controls);
-        controls.iter_mut().for_each(|c| *c = fault(*c));
+        for control in &mut controls {
+            *control = fault(*control);
+        }
         let mut counts = std::collections::BTreeMap::new();
         for &(key, a) in registrations.iter().filter(|r| r.0 & 1 == 0) {
             for &(other, b) in registrations.iter().filter(|r| r.0 / 2 == key / 2) {
