@@ -2,14 +2,15 @@
 //   in   spheres[t]  t < n, grid[0]
 //   out  homes[t]    number of the cell that holds the sphere's centre
 //        controls[t] see control.wgsl
-//        counts[t]   how many cells: 1 to 8
+//        counts[t]   how many cells: 1 to 8; 0 for n ≤ t < params.most
 // Includes: layout.   Twin: src/twin/cells.rs
-@group(0) @binding(0) var<uniform> params: SceneParams;
-@group(0) @binding(1) var<storage, read> spheres: array<vec4<f32>>;
-@group(0) @binding(2) var<storage, read> grids: array<Grid>;
-@group(0) @binding(3) var<storage, read_write> homes: array<u32>;
-@group(0) @binding(4) var<storage, read_write> controls: array<u32>;
-@group(0) @binding(5) var<storage, read_write> counts: array<u32>;
+@group(0) @binding(0) var<uniform> params: LengthParams;
+@group(0) @binding(1) var<storage, read> lengths: array<u32>;
+@group(0) @binding(2) var<storage, read> spheres: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read> grids: array<Grid>;
+@group(0) @binding(4) var<storage, read_write> homes: array<u32>;
+@group(0) @binding(5) var<storage, read_write> controls: array<u32>;
+@group(0) @binding(6) var<storage, read_write> counts: array<u32>;
 
 // Does not decrease along any axis.
 fn cell_of(grid: Grid, x: vec3<f32>) -> vec3<u32> {
@@ -24,7 +25,11 @@ fn cells_count(
     @builtin(num_workgroups) groups: vec3<u32>,
 ) {
     let t = group_index(group, groups) * WORKGROUP + index;
-    if t >= params.triangles { return; }
+    if t >= params.most { return; }
+    if t >= lengths[params.word] {
+        counts[t] = 0u;
+        return;
+    }
     let grid = grids[0];
     let centre = spheres[t].xyz;
     let reach = REACH * spheres[t].w + PLANE_SLACK;

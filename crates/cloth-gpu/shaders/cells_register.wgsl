@@ -4,13 +4,14 @@
 //   out  keys[r], registered[r] r < offsets[n]: 2 · cell, plus 1 where it is not the triangle's home; the triangle.
 //                               What does not fit is left out: the host compares offsets[n] with the room there is.
 // Includes: layout, control.   Twin: src/twin/cells.rs
-@group(0) @binding(0) var<uniform> params: SceneParams;
-@group(0) @binding(1) var<storage, read> homes: array<u32>;
-@group(0) @binding(2) var<storage, read> controls: array<u32>;
-@group(0) @binding(3) var<storage, read> offsets: array<u32>;
-@group(0) @binding(4) var<storage, read> grids: array<Grid>;
-@group(0) @binding(5) var<storage, read_write> keys: array<u32>;
-@group(0) @binding(6) var<storage, read_write> registered: array<u32>;
+@group(0) @binding(0) var<uniform> params: LengthParams;
+@group(0) @binding(1) var<storage, read> lengths: array<u32>;
+@group(0) @binding(2) var<storage, read> homes: array<u32>;
+@group(0) @binding(3) var<storage, read> controls: array<u32>;
+@group(0) @binding(4) var<storage, read> offsets: array<u32>;
+@group(0) @binding(5) var<storage, read> grids: array<Grid>;
+@group(0) @binding(6) var<storage, read_write> keys: array<u32>;
+@group(0) @binding(7) var<storage, read_write> registered: array<u32>;
 
 @compute @workgroup_size(WORKGROUP)
 fn cells_register(
@@ -19,7 +20,7 @@ fn cells_register(
     @builtin(num_workgroups) groups: vec3<u32>,
 ) {
     let t = group_index(group, groups) * WORKGROUP + index;
-    if t >= params.triangles { return; }
+    if t >= min(params.most, lengths[params.word]) { return; }
     let cells = grids[0].cells;
     let strides = vec3<u32>(1u, cells.x, cells.x * cells.y);
     let control = controls[t];

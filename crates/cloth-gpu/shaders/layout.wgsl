@@ -68,7 +68,21 @@ struct Entry {
     triangle: u32,
     // See control.wgsl.
     control: u32,
-    // 1: the cell is not the triangle's home.
-    is_guest: u32,
+    // 2 · cell, plus 1 where that is not the home.
+    key: u32,
+    pad: u32,
+}
+
+// What is asked of the virtual subdivision.
+struct SubdivisionParams {
+    triangles: u32,
+    // See SceneParams.
+    second: u32,
+    // Parts there is room for.
+    room: u32,
+    coarseness: f32,
+    low: vec3<f32>,
+    least: f32,
+    high: vec3<f32>,
     pad: u32,
 }

@@ -1,11 +1,11 @@
 // How many tests each registration begins: a triangle at home meets all that follow it in its cell, where those at home
 // come first. So every pair of a cell in which one is at home comes up once.
-//   in   keys[r]    r < n, sorted
+//   in   entries[r] r < n, sorted by key
 //   out  counts[r]  r < n
 // Includes: layout.   Twin: src/twin/pairs.rs
 @group(0) @binding(0) var<uniform> params: LengthParams;
 @group(0) @binding(1) var<storage, read> lengths: array<u32>;
-@group(0) @binding(2) var<storage, read> keys: array<u32>;
+@group(0) @binding(2) var<storage, read> entries: array<Entry>;
 @group(0) @binding(3) var<storage, read_write> counts: array<u32>;
 
 @compute @workgroup_size(WORKGROUP)
@@ -17,7 +17,7 @@ fn pairs_count(
     let r = group_index(group, groups) * WORKGROUP + index;
     let n = min(params.most, lengths[params.word]);
     if r >= n { return; }
-    let key = keys[r];
+    let key = entries[r].key;
     if (key & 1u) != 0u {
         counts[r] = 0u;
         return;
@@ -25,14 +25,14 @@ fn pairs_count(
     // The cell ends after r and not after far: far doubles its distance until it is past the cell.
     var in_cell = r;
     var distance = 1u;
-    while distance < n - r && keys[r + distance] <= key + 1u {
+    while distance < n - r && entries[r + distance].key <= key + 1u {
         in_cell = r + distance;
         distance = min(2u * distance, n);
     }
     var past = min(distance, n - r) + r;
     while past - in_cell > 1u {
         let middle = in_cell + (past - in_cell) / 2u;
-        if keys[middle] <= key + 1u { in_cell = middle; } else { past = middle; }
+        if entries[middle].key <= key + 1u { in_cell = middle; } else { past = middle; }
     }
     counts[r] = in_cell - r;
 }

@@ -85,7 +85,7 @@ fn spheres_touch(pair: vec2<u32>) -> bool {
 
 // Whether the pair is tested in this cell and not in the home of the second.
 fn is_here(pair: vec2<u32>) -> bool {
-    return entries[pair.y].is_guest == 0u
+    return (entries[pair.y].key & 1u) == 0u
         || !is_left_to_other_cell(entries[pair.x].control, entries[pair.y].control);
 }
 

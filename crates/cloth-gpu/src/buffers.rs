@@ -116,6 +116,11 @@ impl<'a> Length<'a> {
         Self { most, word: Some((&array.raw, index)) }
     }
 
+    /// The low word of the 64-bit number `index` of `array`, at most `most`.
+    pub fn device_wide(most: u32, array: &'a Array<[u32; 2]>, index: u32) -> Self {
+        Self { most, word: Some((&array.raw, 2 * index)) }
+    }
+
     pub(crate) fn buffer(&self, gpu: &'a Gpu) -> &'a wgpu::Buffer {
         self.word.map_or(&gpu.unlimited, |w| w.0)
     }

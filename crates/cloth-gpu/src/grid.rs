@@ -1,4 +1,5 @@
-//! The method "grid": the traditional uniform grid with control bits (thesis 3.3.1), with the workload distribution of 5.3.4.
+//! The methods "grid", the traditional uniform grid with control bits (thesis 3.3.1), and "virtual-subdivision" (thesis 5.3), both
+//! with the workload distribution of 5.3.4.
 
 use crate::buffers::Array;
 use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, NarrowPhase, Query};
@@ -11,13 +12,17 @@ use crate::stages::bounds::Scene;
 use crate::stages::cells::{Cells, key_bits};
 use crate::stages::features::Features;
 use crate::stages::pairs::Pairs;
+use crate::stages::subdivision::{Subdivision, params};
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Room and portions; the contacts never depend on them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct GridOptions {
-    /// Room for registrations, triangle pairs and candidates at first. None: by the number of triangles.
+    /// λ of the virtual subdivision, 1.1 to 1.3 in the thesis (Eq. 5.1): cells are 3 λ times the average radius, and larger triangles are
+    /// registered in parts. None: cells are 3 times the largest radius, and triangles stay whole.
+    pub subdivision: Option<f32>,
+    /// Room for parts, registrations, triangle pairs and candidates at first. None: by the number of triangles.
     pub first_capacity: Option<u32>,
     /// Most triangle pairs and most candidates of a kind at a time. None: 2^23, or what one binding holds.
     pub max_capacity: Option<u32>,
@@ -28,10 +33,14 @@ pub struct GridOptions {
 /// Most triangle pairs and most candidates of a kind at a time: 64 MiB each.
 const MAX_CAPACITY: usize = 1 << 23;
 
+/// Most parts: then the cells are made larger.
+const MAX_PARTS: usize = 1 << 24;
+/// λ that the thesis settles on.
+const LAMBDA: f32 = 1.2;
 /// Tests per triangle in the first portion of the first call.
 const FIRST_TESTS: u64 = 64;
 
-/// Detects contacts with a uniform grid on the device; [`Detector::name`] is `"grid"`.
+/// Detects contacts with a uniform grid on the device; [`Detector::name`] is `"grid"` or `"virtual-subdivision"`.
 ///
 /// The device finds candidates; [`NarrowPhase`] decides them. What overflows is grown and done again; what is too much for
 /// one portion is taken in several, which are decided as they come and not kept.
@@ -43,6 +52,9 @@ pub struct GridGpu {
     vertex_count: usize,
     triangle_count: usize,
     scene: Scene,
+    subdivision: Option<Subdivision>,
+    /// λ, times two for each time that there were too many parts.
+    coarseness: f32,
     cells: Cells,
     pairs: Pairs,
     features: Features,
@@ -53,11 +65,14 @@ pub struct GridGpu {
     /// Triangle pairs whose features are looked at, at most the room for them.
     pair_room: usize,
     registrations: u64,
+    parts: u64,
 }
 
 /// What a submission counted.
 #[derive(Debug, Clone, Copy, Default)]
 struct Counts {
+    is_too_fine: bool,
+    parts: u64,
     key_bits: u32,
     registrations: usize,
     tests: u64,
@@ -67,11 +82,13 @@ struct Counts {
 }
 
 impl Counts {
-    fn new(words: &[u32]) -> Self {
+    fn new(words: &[u32], registrations: usize, parts: u64) -> Self {
         let word = |k: u32| words[k as usize];
         Self {
+            is_too_fine: word(status::TOO_FINE) != 0,
+            parts,
             key_bits: key_bits(words),
-            registrations: word(status::REGISTRATIONS) as usize,
+            registrations,
             tests: u64::from(word(status::PAIRS)) | u64::from(word(status::PAIRS + 1)) << 32,
             triangle_pairs: word(status::TRIANGLE_PAIRS) as usize,
             vertex_triangle: word(status::VERTEX_TRIANGLE) as usize,
@@ -102,6 +119,15 @@ impl GridGpu {
         Self::with_options(gpu, mesh, GridOptions::default())
     }
 
+    /// Virtual subdivision with the thesis's λ = 1.2.
+    ///
+    /// # Errors
+    /// As [`GridGpu::new`].
+    pub fn virtual_subdivision(gpu: Arc<Gpu>, mesh: &CollisionMesh) -> Result<Self, GpuError> {
+        let options = GridOptions { subdivision: Some(LAMBDA), ..GridOptions::default() };
+        Self::with_options(gpu, mesh, options)
+    }
+
     /// [`GridGpu::new`] with other room and portions.
     ///
     /// # Errors
@@ -116,13 +142,23 @@ impl GridGpu {
         let per_submission = options.max_tests.unwrap_or(if gpu.is_software() { 1 << 24 } else { 1 << 28 });
         let dispatched = u64::from(gpu.max_workgroups).pow(2) * u64::from(PAIR_BLOCK);
         let max_tests = u64::from(per_submission).clamp(1, dispatched) as u32;
+        let (parts, subdivision) = match options.subdivision {
+            None => (n, None),
+            Some(_) => {
+                let parts = options.first_capacity.map_or(2 * n, |c| c as usize).max(n).max(1);
+                (parts, Some(Subdivision::new(&gpu, n as u32, parts)?))
+            }
+        };
         Ok(Self {
+            subdivision,
+            // A λ of no sense makes cells of some size all the same, which no contact depends on.
+            coarseness: options.subdivision.unwrap_or(LAMBDA).clamp(1e-3, 1e3),
             max_capacity,
             max_tests,
             vertex_count: mesh.vertex_count,
             triangle_count: n,
             scene: Scene::new(&gpu, mesh)?,
-            cells: Cells::new(&gpu, n as u32, room(4))?,
+            cells: Cells::new(&gpu, parts as u32, room(4))?,
             pairs: Pairs::new(&gpu, room(8).min(max_capacity))?,
             features: Features::new(&gpu, room(8).min(max_capacity))?,
             key_bits: 24,
@@ -132,6 +168,7 @@ impl GridGpu {
             expected: [0, 0],
             pair_room: room(8).clamp(1, max_capacity),
             registrations: 0,
+            parts: 0,
             gpu,
         })
     }
@@ -141,18 +178,42 @@ impl GridGpu {
         self.registrations
     }
 
+    /// Parts that triangles were registered in, in the last call: at least as many as triangles.
+    pub fn parts(&self) -> u64 {
+        self.parts
+    }
+
     /// Memory on the device, scratch memory of sorts and scans not counted [B].
     pub fn bytes(&self) -> u64 {
-        self.scene.bytes() + self.cells.bytes() + self.pairs.bytes() + self.features.bytes()
+        self.scene.bytes()
+            + self.subdivision.as_ref().map_or(0, Subdivision::bytes)
+            + self.cells.bytes()
+            + self.pairs.bytes()
+            + self.features.bytes()
     }
 
     /// Everything up to the tests, unless it is there from the submission before, and `count` tests from `start` on.
-    fn submit(&mut self, is_fresh: bool, start: u64, count: u32) -> Result<(Counts, Answer), GpuError> {
+    fn submit(
+        &mut self,
+        frame: &Frame,
+        is_fresh: bool,
+        start: u64,
+        count: u32,
+    ) -> Result<(Counts, Answer), GpuError> {
         let gpu = self.gpu.clone();
         let mut recorder = Recorder::new(&gpu);
         if is_fresh {
             self.scene.record(&mut recorder);
-            self.cells.record(&mut recorder, &self.scene, self.key_bits)?;
+            let (scene, cells) = (&self.scene, &mut self.cells);
+            if let Some(subdivision) = &mut self.subdivision {
+                let params = params(scene, frame, cells.room(), self.coarseness);
+                subdivision.record(&mut recorder, scene, cells, &params)?;
+                let parts = subdivision.registered(self.triangle_count as u32);
+                cells.record(&mut recorder, parts, &scene.spheres, self.key_bits)?;
+            } else {
+                cells.record_setup(&mut recorder, scene);
+                cells.record(&mut recorder, scene.registered(), &scene.spheres, self.key_bits)?;
+            }
             self.pairs.record_counts(&mut recorder, &self.cells)?;
         } else {
             let first = u64::from(status::TRIANGLE_PAIRS);
@@ -165,14 +226,40 @@ impl GridGpu {
         for (list, expected) in lists.into_iter().zip(self.expected) {
             recorder.download(list, 0..expected.min(list.capacity()));
         }
+        let room = self.cells.room() as usize;
+        let registrations = recorder.download(&self.cells.offsets, room..room + 1);
+        let n = self.triangle_count;
+        let parts = self.subdivision.as_ref().map(|s| recorder.download(&s.sums, n..n + 1));
         let answer = recorder.run()?;
-        Ok((Counts::new(&answer.read::<u32>(words)), answer))
+        let registrations = answer.read::<u32>(registrations)[0] as usize;
+        let parts = parts.map_or(n as u64, |copy| {
+            let [low, high] = answer.read::<[u32; 2]>(copy)[0];
+            u64::from(low) | u64::from(high) << 32
+        });
+        Ok((Counts::new(&answer.read::<u32>(words), registrations, parts), answer))
     }
 
     /// Makes room for what the registrations need; true if they have to be done again.
     fn grow_cells(&mut self, counts: &Counts) -> Result<bool, GpuError> {
-        let fits = counts.registrations <= self.cells.keys.capacity() && counts.key_bits <= self.key_bits;
-        self.cells.grow(&self.gpu, counts.registrations)?;
+        let room = self.cells.room() as usize;
+        let fits = counts.parts <= room as u64
+            && counts.registrations <= self.cells.keys.capacity()
+            && counts.key_bits <= self.key_bits;
+        if let Some(subdivision) = &mut self.subdivision {
+            let most = Array::<[f32; 4]>::most(&self.gpu).min(MAX_PARTS) as u64;
+            if counts.is_too_fine || counts.parts > most {
+                self.coarseness *= 2.0;
+                return Ok(true);
+            }
+            if counts.parts > room as u64 {
+                let wanted = (counts.parts + counts.parts / 4).min(most) as usize;
+                subdivision.grow(&self.gpu, wanted)?;
+                self.cells.grow(&self.gpu, wanted as u32, 0)?;
+                // What was registered was a part of it.
+                return Ok(true);
+            }
+        }
+        self.cells.grow(&self.gpu, room as u32, counts.registrations)?;
         self.key_bits = self.key_bits.max(counts.key_bits);
         Ok(!fits)
     }
@@ -245,7 +332,7 @@ impl GridGpu {
         let (mut portion, mut portions, mut is_fresh) = (self.portion, 0, true);
         loop {
             let clock = Instant::now();
-            let (counts, answer) = self.submit(is_fresh, start, portion)?;
+            let (counts, answer) = self.submit(&frame, is_fresh, start, portion)?;
             for &(name, s) in &answer.seconds {
                 seconds.add(name, s);
             }
@@ -256,6 +343,7 @@ impl GridGpu {
                 }
                 tests = counts.tests;
                 self.registrations = counts.registrations as u64;
+                self.parts = counts.parts;
                 is_fresh = false;
             }
             if let Some(next) = self.grow_lists(&counts, portion)? {
@@ -296,7 +384,7 @@ impl GridGpu {
 
 impl Detector for GridGpu {
     fn name(&self) -> &'static str {
-        "grid"
+        if self.subdivision.is_some() { "virtual-subdivision" } else { "grid" }
     }
 
     fn detect(
@@ -312,9 +400,10 @@ impl Detector for GridGpu {
         if mesh.triangles.is_empty() {
             return Ok(Contacts::default());
         }
+        let detector = self.name();
         self.run(mesh, query, pool).map_err(|error| match error {
             GpuError::Query(error) => error,
-            error => DetectError::Device { detector: "grid", reason: error.to_string() },
+            error => DetectError::Device { detector, reason: error.to_string() },
         })
     }
 }

@@ -108,8 +108,30 @@ pub struct Entry {
     pub triangle: u32,
     /// Its control bits: see `control.wgsl`.
     pub control: u32,
-    /// 1: the cell is not the triangle's home.
-    pub is_guest: u32,
+    /// 2 · cell, plus 1 where that is not the home.
+    pub key: u32,
+    /// Unused.
+    pub pad: u32,
+}
+
+/// What is asked of the virtual subdivision.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct SubdivisionParams {
+    /// Number of triangles.
+    pub triangles: u32,
+    /// See [`SceneParams`].
+    pub second: u32,
+    /// Parts there is room for.
+    pub room: u32,
+    /// λ, times two for each time that the parts were too many.
+    pub coarseness: f32,
+    /// Lower corner of the scene's box.
+    pub low: [f32; 3],
+    /// What no subdivision gets a radius below.
+    pub least: f32,
+    /// Upper corner.
+    pub high: [f32; 3],
     /// Unused.
     pub pad: u32,
 }

@@ -37,8 +37,10 @@ pub mod status {
     pub const VERTEX_TRIANGLE: u32 = 6;
     /// Edge-edge candidates, in this part of the tests.
     pub const EDGE_EDGE: u32 = 7;
+    /// 1: some triangle would come to more than [`super::MAX_PART_BITS`] allows.
+    pub const TOO_FINE: u32 = 8;
     /// Words.
-    pub const LENGTH: u32 = 8;
+    pub const LENGTH: u32 = 9;
 }
 
 /// A sphere is registered in the cells that it touches once its radius is multiplied by this: a little more than √2. Of two
@@ -54,6 +56,11 @@ pub const MIN_CELL: f32 = 1.0 / (1 << 11) as f32;
 /// Most cells: their numbers and one bit more fit into a key.
 pub const MAX_CELLS: f32 = (1u32 << 30) as f32;
 
+/// Logarithm of the parts that one triangle may come to: 4^l · 2^m with 2 l + m at most this.
+pub const MAX_PART_BITS: u32 = 18;
+/// What the rounding of a part's corners can add up to, with room: sums of six products of numbers within [−1, 1].
+pub const PART_SLACK: f32 = 1.0 / (1 << 19) as f32;
+
 /// The constants as WGSL.
 pub fn shader_prelude() -> String {
     let floats = [
@@ -62,6 +69,7 @@ pub fn shader_prelude() -> String {
         ("CELL_RADII", CELL_RADII),
         ("MIN_CELL", MIN_CELL),
         ("MAX_CELLS", MAX_CELLS),
+        ("PART_SLACK", PART_SLACK),
     ]
     .map(|(name, value)| format!("const {name} = {value:?}f;\n"));
     let words = [
@@ -75,6 +83,8 @@ pub fn shader_prelude() -> String {
         ("PAIR_ITEMS", PAIR_ITEMS),
         ("PAIR_BLOCK", PAIR_BLOCK),
         ("SEARCH_WINDOW", SEARCH_WINDOW),
+        ("MAX_PART_BITS", MAX_PART_BITS),
+        ("STATUS_TOO_FINE", status::TOO_FINE),
         ("STATUS_RADIUS", status::RADIUS),
         ("STATUS_KEY_BITS", status::KEY_BITS),
         ("STATUS_REGISTRATIONS", status::REGISTRATIONS),

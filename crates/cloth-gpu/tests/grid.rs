@@ -34,7 +34,8 @@ fn compare_all(
     what: &str,
 ) -> usize {
     let mut found = 0;
-    let mut grid = GridGpu::new(gpu.clone(), mesh).unwrap();
+    let mut methods =
+        [GridGpu::new(gpu.clone(), mesh).unwrap(), GridGpu::virtual_subdivision(gpu.clone(), mesh).unwrap()];
     let mask: Vec<bool> = (0..mesh.vertex_count).map(|_| random.below(10) == 0).collect();
     let none = vec![false; mesh.vertex_count];
     for mode in [Mode::Continuous, Mode::Discrete] {
@@ -42,7 +43,10 @@ fn compare_all(
             for active in [None, Some(&mask[..]), Some(&none[..])] {
                 let query = Query { x_t0, x_t1, thickness, mode, active };
                 let what = format!("{what}, {mode:?}, {thickness}, {}", active.is_some());
-                found += compare(&mut grid, mesh, &query, &what);
+                for grid in &mut methods {
+                    let name = grid.name();
+                    found += compare(grid, mesh, &query, &format!("{name}, {what}"));
+                }
             }
         }
     }
@@ -95,6 +99,50 @@ fn sheets_far_from_the_origin_agree() {
         let found = compare_all(&device.gpu, &mesh, &x_t0, &x_t1, &mut random, &format!("sheet at {offset}"));
         assert!(found > 10, "the scene must hold contacts, found {found}");
     }
+}
+
+/// Triangles of very different sizes: most are registered in parts, in space and in time.
+#[test]
+fn subdivision_agrees_and_tests_less() {
+    let Some(device) = device(GpuOptions::default()) else { return };
+    let (mut found, mut tests) = (0, [0u64; 2]);
+    for seed in 0..4 {
+        let mut random = Random(60 + seed);
+        let (mut x_t0, mut triangles) = soup(500, 0.03, &mut random);
+        triangles.retain(|t| t[0] + 2 == t[2]);
+        let (x, mut large) = soup(6, 0.5, &mut random);
+        large.iter_mut().flatten().for_each(|v| *v += x_t0.len() as u32);
+        x_t0.extend(x);
+        triangles.extend(large);
+        let mut x_t1 = moved(&x_t0, 0.01, &mut random);
+        // Some fly across the scene.
+        for t in triangles.iter().step_by(50) {
+            let by = random.vector(0.8);
+            t.iter().for_each(|&v| x_t1[v as usize] += by);
+        }
+        let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+        for lambda in [0.5, 1.0, 1.2, 3.0] {
+            let options = GridOptions { subdivision: Some(lambda), ..GridOptions::default() };
+            let mut parts = GridGpu::with_options(device.gpu.clone(), &mesh, options).unwrap();
+            assert_eq!(parts.name(), "virtual-subdivision");
+            for (mode, thickness) in
+                [(Mode::Continuous, 0.0), (Mode::Discrete, 0.02), (Mode::Continuous, 0.3)]
+            {
+                let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
+                found +=
+                    compare(&mut parts, &mesh, &query, &format!("{seed}, λ {lambda}, {mode:?}, {thickness}"));
+                assert!(parts.parts() > triangles.len() as u64 || thickness > 0.1 || lambda > 2.0);
+            }
+        }
+        let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
+        let methods = [GridGpu::new, GridGpu::virtual_subdivision];
+        for (method, tests) in methods.iter().zip(&mut tests) {
+            let mut detector = method(device.gpu.clone(), &mesh).unwrap();
+            *tests += detector.detect(&mesh, &query, &pool(1)).unwrap().stats.broad_phase_tests;
+        }
+    }
+    assert!(found > 1000, "the scenes must hold contacts, found {found}");
+    assert!(tests[1] * 4 < tests[0], "{tests:?}");
 }
 
 #[test]
@@ -172,9 +220,12 @@ fn small_room_and_small_portions_change_nothing() {
             (None, None, Some(777)),
             (Some(50), Some(1000), Some(5000)),
         ] {
-            let options = GridOptions { first_capacity: first, max_capacity: most, max_tests: tests };
-            let mut grid = GridGpu::with_options(device.gpu.clone(), &mesh, options).unwrap();
-            assert!(compare(&mut grid, &mesh, &query, &format!("{options:?}")) > 1000);
+            for subdivision in [None, Some(1.2)] {
+                let options =
+                    GridOptions { subdivision, first_capacity: first, max_capacity: most, max_tests: tests };
+                let mut grid = GridGpu::with_options(device.gpu.clone(), &mesh, options).unwrap();
+                assert!(compare(&mut grid, &mesh, &query, &format!("{options:?}")) > 1000);
+            }
         }
     }
 }

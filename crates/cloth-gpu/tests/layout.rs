@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use cloth_gpu::kernel::Source;
-use cloth_gpu::layout::{Bounds, Entry, Grid, LengthParams, PairParams, SceneParams};
-use cloth_gpu::stages::{bounds, cells, compact, features, pairs, scan, sort};
+use cloth_gpu::layout::{Bounds, Entry, Grid, LengthParams, PairParams, SceneParams, SubdivisionParams};
+use cloth_gpu::stages::{bounds, cells, compact, features, pairs, scan, sort, subdivision};
 use std::mem::offset_of;
 
 /// Name, offset and size of each member, and the struct's size.
@@ -36,7 +36,8 @@ fn layouts_are_equal() {
         layout!(Grid { low, size, cells, inverse }),
         layout!(PairParams { most, word, start_low, start_high, count, pad_0, pad_1, pad_2 }),
         layout!(Bounds { low_0, is_active, high_0, body, low_1, pad_low, high_1, pad_high }),
-        layout!(Entry { centre, radius, triangle, control, is_guest, pad }),
+        layout!(SubdivisionParams { triangles, second, room, coarseness, low, least, high, pad }),
+        layout!(Entry { centre, radius, triangle, control, key, pad }),
     ] {
         assert_eq!(host, layout_in_wgsl(name), "{name}");
     }
@@ -52,6 +53,7 @@ fn all_sources() -> Vec<Source> {
     let mut all = vec![compact::source(), bounds::source(), features::source()];
     all.extend(cells::sources());
     all.extend(pairs::sources());
+    all.extend(subdivision::sources());
     for flag in [false, true] {
         for subgroups in [false, true] {
             all.extend(scan::sources::<u32>(subgroups, flag));

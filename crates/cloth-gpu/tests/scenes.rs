@@ -30,13 +30,16 @@ fn scene(name: &str) -> Option<Scene> {
     Some(Scene { x_t0: positions("V0.npy"), x_t1: positions("V1.npy"), triangles })
 }
 
-fn agrees(name: &str, modes: &[Mode], turns: &[&str]) {
+fn agrees(method: &str, name: &str, modes: &[Mode], turns: &[&str]) {
     let Some(device) = device(GpuOptions::default()) else { return };
     let Some(Scene { x_t0, x_t1, triangles }) = scene(name) else { return };
     let pool = pool(2);
     let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
     let mut bvh = Bvh::new(&mesh, &x_t0).unwrap();
-    let mut grid = GridGpu::new(device.gpu.clone(), &mesh).unwrap();
+    let mut grid = match method {
+        "grid" => GridGpu::new(device.gpu.clone(), &mesh).unwrap(),
+        _ => GridGpu::virtual_subdivision(device.gpu.clone(), &mesh).unwrap(),
+    };
     for &mode in modes {
         let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode, active: None };
         let expected = bvh.detect(&mesh, &query, &pool).unwrap();
@@ -44,13 +47,14 @@ fn agrees(name: &str, modes: &[Mode], turns: &[&str]) {
             let clock = Instant::now();
             let got = grid.detect(&mesh, &query, &pool).unwrap();
             println!(
-                "{name}, {mode:?}, {turn}: {:.2} s, {} registrations, {} MiB, {:?}",
+                "{method}, {name}, {mode:?}, {turn}: {:.2} s, {} parts, {} registrations, {} MiB, {:?}",
                 clock.elapsed().as_secs_f64(),
+                grid.parts(),
                 grid.registrations(),
                 grid.bytes() >> 20,
                 got.stats
             );
-            assert_eq!(difference(&expected, &got), None, "{name}, {mode:?}, {turn}");
+            assert_eq!(difference(&expected, &got), None, "{method}, {name}, {mode:?}, {turn}");
         }
         assert!(!expected.edge_edge.is_empty() || mode == Mode::Discrete);
     }
@@ -58,16 +62,24 @@ fn agrees(name: &str, modes: &[Mode], turns: &[&str]) {
 
 #[test]
 fn cloth_ball_agrees() {
-    agrees("cloth-ball", &[Mode::Continuous], &["first"]);
+    agrees("grid", "cloth-ball", &[Mode::Continuous], &["first"]);
 }
 
 #[test]
 fn funnel_agrees() {
-    agrees("cloth-funnel", &[Mode::Continuous, Mode::Discrete], &["first", "again"]);
+    agrees("grid", "cloth-funnel", &[Mode::Continuous, Mode::Discrete], &["first", "again"]);
 }
 
 #[test]
 #[ignore = "slow on a software adapter: run with --ignored"]
 fn n_body_agrees() {
-    agrees("n-body-simulation", &[Mode::Continuous], &["first"]);
+    agrees("grid", "n-body-simulation", &[Mode::Continuous], &["first"]);
+}
+
+#[test]
+fn subdivision_agrees_on_all() {
+    let both = [Mode::Continuous, Mode::Discrete];
+    for name in ["cloth-ball", "cloth-funnel", "n-body-simulation"] {
+        agrees("virtual-subdivision", name, &both, &["first", "again"]);
+    }
 }

@@ -65,7 +65,8 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> Run {
     let features = Features::new(gpu, room).unwrap();
     let mut recorder = Recorder::new(gpu);
     scene.record(&mut recorder);
-    cells.record(&mut recorder, &scene, 32).unwrap();
+    cells.record_setup(&mut recorder, &scene);
+    cells.record(&mut recorder, scene.registered(), &scene.spheres, 32).unwrap();
     pairs.record_counts(&mut recorder, &cells).unwrap();
     pairs.record_tests(&mut recorder, &scene, &cells, 0, tests);
     features.record(&mut recorder, &scene, &pairs.found, room as u32);
@@ -273,7 +274,7 @@ fn planted_faults_are_caught() {
         ("offsets", |r| r.offsets[500] += 1),
         ("registrations", |r| r.keys[50] ^= 1),
         ("registrations", |r| r.registered.swap(0, 1)),
-        ("entries", |r| r.entries[20].is_guest ^= 1),
+        ("entries", |r| r.entries[20].key ^= 1),
         ("test counts", |r| r.counts[30] += 1),
         ("test sums", |r| r.sums[40][1] += 1),
         ("triangle pairs", |r| r.pairs.truncate(r.pairs.len() - 1)),

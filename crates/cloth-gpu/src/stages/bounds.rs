@@ -1,6 +1,6 @@
 //! Boxes and spheres of the triangles, and the scene that they come from.
 
-use crate::buffers::Array;
+use crate::buffers::{Array, Length};
 use crate::collision::{CollisionMesh, Query};
 use crate::context::Gpu;
 use crate::error::GpuError;
@@ -9,6 +9,7 @@ use crate::kernel::{Kernel, Source};
 use crate::layout::{Bounds, SceneParams};
 use crate::limits::{WORKGROUP, status};
 use crate::recorder::Recorder;
+use crate::stages::cells::Registered;
 use std::sync::Arc;
 
 /// A scene on the device: its topology, written once, and what each query brings.
@@ -113,6 +114,11 @@ impl Scene {
             &self.status.raw,
         ];
         recorder.dispatch(&self.kernel, &self.params, &arrays, self.params.triangles.div_ceil(WORKGROUP));
+    }
+
+    /// The triangles as what is registered in cells.
+    pub fn registered(&self) -> Registered<'_> {
+        Registered { spheres: &self.spheres, length: Length::host(self.params.triangles), roots: None }
     }
 
     /// Memory [B].

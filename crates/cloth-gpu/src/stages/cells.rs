@@ -19,7 +19,7 @@ use crate::buffers::Array;
 use crate::context::Gpu;
 use crate::error::GpuError;
 use crate::kernel::{Kernel, Source};
-use crate::layout::{Entry, Grid, LengthParams, SceneParams};
+use crate::layout::{Entry, Grid, LengthParams};
 use crate::limits::WORKGROUP;
 use crate::recorder::Recorder;
 use crate::stages::bounds::Scene;
@@ -28,16 +28,19 @@ use crate::stages::sort::Sort;
 use crate::{Length, limits::status};
 use std::sync::Arc;
 
-/// Registrations of the triangles in the cells, sorted by cell.
+/// Registrations in the cells, sorted by cell: of whole triangles, or of parts of them.
 #[derive(Debug)]
 pub struct Cells {
     setup: Arc<Kernel>,
     count: Arc<Kernel>,
     register: Arc<Kernel>,
-    gather: Arc<Kernel>,
+    mark: Arc<Kernel>,
+    gather: [Arc<Kernel>; 2],
     scan: Scan<u32>,
     sort: Sort,
-    triangles: u32,
+    /// What can be registered.
+    room: u32,
+    is_virtual: bool,
     /// The cells: one element.
     pub grid: Array<Grid>,
     /// Home cell of each triangle.
@@ -46,43 +49,63 @@ pub struct Cells {
     pub controls: Array<u32>,
     /// Cells of each triangle.
     pub counts: Array<u32>,
-    /// First registration of each triangle, and their number.
+    /// First registration of each triangle; the last element is their number.
     pub offsets: Array<u32>,
     /// Keys of the registrations, sorted.
     pub keys: Array<u32>,
     /// Triangles of the registrations.
     pub registered: Array<u32>,
-    /// The registrations with what their tests ask first.
+    /// Which registrations of parts are kept.
+    pub marks: Array<u32>,
+    /// Kept registrations before each one; the last element is their number.
+    pub kept: Array<u32>,
+    /// The kept registrations with what their tests ask first.
     pub entries: Array<Entry>,
 }
 
-/// The texts of the kernels: setup, count, register, gather.
-pub fn sources() -> [Source; 4] {
+/// What is registered: spheres, how many, and, of parts, the triangles they belong to.
+#[derive(Debug, Clone, Copy)]
+pub struct Registered<'a> {
+    /// Centre and radius.
+    pub spheres: &'a Array<[f32; 4]>,
+    /// How many.
+    pub length: Length<'a>,
+    /// Triangle of each part; None: triangles themselves.
+    pub roots: Option<&'a Array<u32>>,
+}
+
+/// The texts of the kernels: setup, count, register, mark, gather of triangles, gather of parts.
+pub fn sources() -> [Source; 6] {
+    let gather = || Source::new("cells_gather", include_str!("../../shaders/cells_gather.wgsl"));
     [
         Source::new("grid_setup", include_str!("../../shaders/grid_setup.wgsl")),
         Source::new("cells_count", include_str!("../../shaders/cells_count.wgsl")),
         Source::new("cells_register", include_str!("../../shaders/cells_register.wgsl"))
             .include(include_str!("../../shaders/control.wgsl")),
-        Source::new("cells_gather", include_str!("../../shaders/cells_gather.wgsl")),
+        Source::new("cells_mark", include_str!("../../shaders/cells_mark.wgsl")),
+        gather(),
+        gather().switch("VIRTUAL", true),
     ]
 }
 
 impl Cells {
-    /// Builds the pipelines; room for `capacity` registrations.
+    /// Builds the pipelines; room for so many triangles or parts, and for `capacity` registrations.
     ///
     /// # Errors
     /// [`GpuError::Shader`], [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
-    pub fn new(gpu: &Gpu, triangles: u32, capacity: usize) -> Result<Self, GpuError> {
-        let [setup, count, register, gather] = sources();
-        let n = triangles as usize;
+    pub fn new(gpu: &Gpu, room: u32, capacity: usize) -> Result<Self, GpuError> {
+        let [setup, count, register, mark, gather, gather_parts] = sources();
+        let n = room as usize;
         Ok(Self {
             setup: setup.kernel(gpu)?,
             count: count.kernel(gpu)?,
             register: register.kernel(gpu)?,
-            gather: gather.kernel(gpu)?,
+            mark: mark.kernel(gpu)?,
+            gather: [gather.kernel(gpu)?, gather_parts.kernel(gpu)?],
             scan: Scan::new(gpu)?,
             sort: Sort::new(gpu)?,
-            triangles,
+            room,
+            is_virtual: false,
             grid: Array::new(gpu, "grid", 1)?,
             homes: Array::new(gpu, "home cells", n)?,
             controls: Array::new(gpu, "control bits", n)?,
@@ -90,44 +113,78 @@ impl Cells {
             offsets: Array::new(gpu, "first registrations", n + 1)?,
             keys: Array::new(gpu, "cell keys", capacity)?,
             registered: Array::new(gpu, "registered triangles", capacity)?,
+            marks: Array::new(gpu, "marks", 1)?,
+            kept: Array::new(gpu, "kept registrations", 1)?,
             entries: Array::new(gpu, "registrations by cell", capacity)?,
         })
     }
 
-    /// Makes room for `needed` registrations.
+    /// Makes room for so many parts and registrations.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
-    pub fn grow(&mut self, gpu: &Gpu, needed: usize) -> Result<(), GpuError> {
-        self.keys.grow(gpu, needed)?;
-        self.registered.grow(gpu, needed)?;
-        self.entries.grow(gpu, needed)
+    pub fn grow(&mut self, gpu: &Gpu, room: u32, registrations: usize) -> Result<(), GpuError> {
+        for array in [&mut self.homes, &mut self.controls, &mut self.counts] {
+            array.grow(gpu, room as usize)?;
+        }
+        self.offsets.grow(gpu, room as usize + 1)?;
+        self.room = self.room.max(room);
+        self.keys.grow(gpu, registrations)?;
+        self.registered.grow(gpu, registrations)?;
+        self.entries.grow(gpu, registrations)
     }
 
-    /// How many registrations there are, bounded by the room.
+    /// What can be registered.
+    pub fn room(&self) -> u32 {
+        self.room
+    }
+
+    /// How many entries there are, bounded by the room.
     pub fn length(&self) -> Length<'_> {
-        Length::device(self.keys.capacity() as u32, &self.offsets, self.triangles)
+        let most = self.keys.capacity() as u32;
+        if self.is_virtual {
+            Length::device(most, &self.kept, most)
+        } else {
+            Length::device(most, &self.offsets, self.room)
+        }
     }
 
-    /// Records the registrations, sorted by the lowest `key_bits` bits of their keys.
+    /// Records size and number of the cells for the largest sphere.
+    pub fn record_setup(&self, recorder: &mut Recorder<'_>, scene: &Scene) {
+        recorder.stage("cells");
+        recorder.dispatch(&self.setup, &scene.params, &[&scene.status.raw, &self.grid.raw], 1);
+    }
+
+    /// Records the registrations of `what`, sorted by the lowest `key_bits` bits of their keys. `spheres`: of the whole
+    /// triangles.
     ///
     /// # Errors
     /// [`GpuError::TooLarge`], [`GpuError::OutOfMemory`] for scratch memory.
     pub fn record(
         &mut self,
         recorder: &mut Recorder<'_>,
-        scene: &Scene,
+        what: Registered<'_>,
+        spheres: &Array<[f32; 4]>,
         key_bits: u32,
     ) -> Result<(), GpuError> {
-        let params: &SceneParams = &scene.params;
-        let groups = self.triangles.div_ceil(WORKGROUP);
-        recorder.stage("cells");
-        recorder.dispatch(&self.setup, params, &[&scene.status.raw, &self.grid.raw], 1);
-        let arrays =
-            [&scene.spheres.raw, &self.grid.raw, &self.homes.raw, &self.controls.raw, &self.counts.raw];
-        recorder.dispatch(&self.count, params, &arrays, groups);
-        self.scan.record(recorder, &self.counts, Length::host(self.triangles), &self.offsets)?;
+        let gpu = recorder.gpu();
+        self.is_virtual = what.roots.is_some();
+        let lengths = what.length.buffer(gpu);
+        let params = LengthParams { most: self.room, word: what.length.index(), ..Default::default() };
+        // Whatever bounds `what` bounds the dispatch; the rest of the counts has to be zero for the scan all the same.
+        let groups = self.room.div_ceil(WORKGROUP);
         let arrays = [
+            lengths,
+            &what.spheres.raw,
+            &self.grid.raw,
+            &self.homes.raw,
+            &self.controls.raw,
+            &self.counts.raw,
+        ];
+        recorder.dispatch(&self.count, &params, &arrays, groups);
+        self.scan.record(recorder, &self.counts, Length::host(self.room), &self.offsets)?;
+        let arrays = [
+            lengths,
             &self.homes.raw,
             &self.controls.raw,
             &self.offsets.raw,
@@ -135,31 +192,52 @@ impl Cells {
             &self.keys.raw,
             &self.registered.raw,
         ];
-        recorder.dispatch(&self.register, params, &arrays, groups);
+        recorder.dispatch(&self.register, &params, &arrays, groups);
+
         recorder.stage("sort");
         let most = self.keys.capacity() as u32;
-        let length = Length::device(most, &self.offsets, self.triangles);
+        let length = Length::device(most, &self.offsets, self.room);
         self.sort.record(recorder, &self.keys, &self.registered, length, key_bits)?;
-        let params = LengthParams { most, word: self.triangles, ..Default::default() };
-        let arrays = [
+
+        recorder.stage("gather");
+        let params = LengthParams { most, word: self.room, ..Default::default() };
+        let groups = most.div_ceil(WORKGROUP);
+        let mut arrays = vec![
             &self.offsets.raw,
             &self.keys.raw,
             &self.registered.raw,
-            &scene.spheres.raw,
+            &spheres.raw,
             &self.controls.raw,
             &self.entries.raw,
         ];
-        recorder.dispatch(&self.gather, &params, &arrays, most.div_ceil(WORKGROUP));
+        if let Some(roots) = what.roots {
+            self.marks.grow(gpu, most as usize)?;
+            self.kept.grow(gpu, most as usize + 1)?;
+            let marking =
+                [&self.offsets.raw, &self.keys.raw, &self.registered.raw, &roots.raw, &self.marks.raw];
+            recorder.dispatch(&self.mark, &params, &marking, groups);
+            self.scan.record(recorder, &self.marks, Length::host(most), &self.kept)?;
+            arrays.extend([&roots.raw, &self.kept.raw]);
+            recorder.dispatch(&self.gather[1], &params, &arrays, groups);
+        } else {
+            recorder.dispatch(&self.gather[0], &params, &arrays, groups);
+        }
         Ok(())
     }
 
     /// Memory [B].
     pub fn bytes(&self) -> u64 {
-        [&self.homes, &self.controls, &self.counts, &self.offsets, &self.keys, &self.registered]
-            .map(Array::bytes)
-            .iter()
-            .sum::<u64>()
-            + self.entries.bytes()
+        let words = [
+            &self.homes,
+            &self.controls,
+            &self.counts,
+            &self.offsets,
+            &self.keys,
+            &self.registered,
+            &self.marks,
+            &self.kept,
+        ];
+        words.map(Array::bytes).iter().sum::<u64>() + self.entries.bytes()
     }
 }
 

@@ -7,3 +7,4 @@ pub mod features;
 pub mod pairs;
 pub mod scan;
 pub mod sort;
+pub mod subdivision;

@@ -64,7 +64,7 @@ impl Pairs {
         self.sums.grow(gpu, n.most as usize + 1)?;
         recorder.stage("workload");
         let params = LengthParams { most: n.most, word: n.index(), ..Default::default() };
-        let arrays = [n.buffer(gpu), &cells.keys.raw, &self.counts.raw];
+        let arrays = [n.buffer(gpu), &cells.entries.raw, &self.counts.raw];
         recorder.dispatch(&self.count, &params, &arrays, n.most.div_ceil(WORKGROUP));
         self.scan.record(recorder, &self.counts, n, &self.sums)
     }

@@ -45,7 +45,7 @@ pub fn pairs_test(
             let (a, b) = (&entries[r], &entries[r + 1 + partner]);
             let (x, y) = (&bounds[a.triangle as usize], &bounds[b.triangle as usize]);
             if spheres_touch(a, b, factor)
-                && (b.is_guest == 0 || !is_left_to_other_cell(a.control, b.control))
+                && (b.key & 1 == 0 || !is_left_to_other_cell(a.control, b.control))
                 && (x.is_active | y.is_active) != 0
                 && bodies_meet(x.body, y.body)
                 && MovingBox::from(x).may_touch(&y.into())
