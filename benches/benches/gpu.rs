@@ -82,9 +82,10 @@ fn methods(c: &mut Criterion) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let (triangles, x_t0, x_t1) = folded(113);
     let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
-    let detectors: [(&str, Box<dyn Detector>); 2] = [
+    let detectors: [(&str, Box<dyn Detector>); 3] = [
         ("bvh", Box::new(Bvh::new(&mesh, &x_t0).unwrap())),
-        ("grid on the device", Box::new(GridGpu::new(gpu, &mesh).unwrap())),
+        ("grid on the device", Box::new(GridGpu::new(gpu.clone(), &mesh).unwrap())),
+        ("virtual subdivision on the device", Box::new(GridGpu::virtual_subdivision(gpu, &mesh).unwrap())),
     ];
     let mut group = c.benchmark_group("folded, 25088 triangles");
     group.sample_size(10);

@@ -37,6 +37,8 @@ const MAX_CAPACITY: usize = 1 << 23;
 const MAX_PARTS: usize = 1 << 24;
 /// λ that the thesis settles on.
 const LAMBDA: f32 = 1.2;
+/// Least and most λ: beyond, cells hold nothing or everything.
+const LAMBDAS: [f32; 2] = [0.1, 100.0];
 /// Tests per triangle in the first portion of the first call.
 const FIRST_TESTS: u64 = 64;
 
@@ -131,7 +133,7 @@ impl GridGpu {
     /// [`GridGpu::new`] with other room and portions.
     ///
     /// # Errors
-    /// As [`GridGpu::new`].
+    /// As [`GridGpu::new`]; [`GpuError::Query`] for a λ outside 0.1 to 100.
     pub fn with_options(gpu: Arc<Gpu>, mesh: &CollisionMesh, options: GridOptions) -> Result<Self, GpuError> {
         let n = mesh.triangles.len();
         // One invocation per triangle pair.
@@ -142,17 +144,22 @@ impl GridGpu {
         let per_submission = options.max_tests.unwrap_or(if gpu.is_software() { 1 << 24 } else { 1 << 28 });
         let dispatched = u64::from(gpu.max_workgroups).pow(2) * u64::from(PAIR_BLOCK);
         let max_tests = u64::from(per_submission).clamp(1, dispatched) as u32;
-        let (parts, subdivision) = match options.subdivision {
-            None => (n, None),
-            Some(_) => {
-                let parts = options.first_capacity.map_or(2 * n, |c| c as usize).max(n).max(1);
-                (parts, Some(Subdivision::new(&gpu, n as u32, parts)?))
-            }
-        };
+        let lambda = options.subdivision.unwrap_or(LAMBDA);
+        if !(LAMBDAS[0]..=LAMBDAS[1]).contains(&lambda) {
+            return Err(GpuError::Query(DetectError::Parameter {
+                parameter: "subdivision",
+                expected: "λ from 0.1 to 100",
+                got: lambda.into(),
+            }));
+        }
+        let (mut parts, mut subdivision) = (n, None);
+        if options.subdivision.is_some() {
+            parts = options.first_capacity.map_or(2 * n, |c| c as usize).max(n).max(1);
+            subdivision = Some(Subdivision::new(&gpu, n as u32, parts)?);
+        }
         Ok(Self {
             subdivision,
-            // A λ of no sense makes cells of some size all the same, which no contact depends on.
-            coarseness: options.subdivision.unwrap_or(LAMBDA).clamp(1e-3, 1e3),
+            coarseness: lambda,
             max_capacity,
             max_tests,
             vertex_count: mesh.vertex_count,

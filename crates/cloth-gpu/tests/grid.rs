@@ -5,7 +5,7 @@ mod support;
 
 use cloth_gpu::collision::{BruteForce, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use cloth_gpu::twin::grid::GridTwin;
-use cloth_gpu::{Frame, Gpu, GpuOptions, GridGpu, GridOptions};
+use cloth_gpu::{Frame, Gpu, GpuError, GpuOptions, GridGpu, GridOptions};
 use std::sync::Arc;
 use support::{Random, bodies, device, difference, pool, sheet, soup, variants};
 
@@ -279,6 +279,14 @@ fn bad_input_is_named() {
         ask(&Query { x_t1: &bad, ..good }),
         Err(DetectError::NotFinite { array: "x_t1", vertex: 2, .. })
     ));
+    for lambda in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        let options = GridOptions { subdivision: Some(lambda), ..GridOptions::default() };
+        let refused = GridGpu::with_options(device.gpu.clone(), &mesh, options).map(|_| ());
+        assert!(matches!(
+            refused,
+            Err(GpuError::Query(DetectError::Parameter { parameter: "subdivision", .. }))
+        ));
+    }
     let empty = CollisionMesh::single(3, &[]).unwrap();
     assert!(matches!(
         grid.detect(&empty, &good, &pool(1)),

@@ -5,9 +5,10 @@ mod support;
 
 use bytemuck::Pod;
 use cloth_gpu::collision::{CollisionMesh, Mode, Query, Vec3};
-use cloth_gpu::layout::{Bounds, Entry, Grid, SceneParams};
+use cloth_gpu::layout::{Bounds, Entry, Grid, SceneParams, SubdivisionParams};
 use cloth_gpu::limits::{REACH, WORKGROUP, status};
 use cloth_gpu::stages::bounds::{Scene, active_words, feature_words, triangle_words};
+use cloth_gpu::stages::subdivision::{self, Subdivision};
 use cloth_gpu::stages::{cells::Cells, features::Features, pairs::Pairs};
 use cloth_gpu::twin::{self, pairs::SPHERE_FACTOR};
 use cloth_gpu::{Array, Frame, Gpu, Recorder};
@@ -285,5 +286,187 @@ fn planted_faults_are_caught() {
         let mut bad = good.clone();
         fault(&mut bad);
         assert_eq!(difference(&bad), Some(stage));
+    }
+}
+
+/// What the stages of the virtual subdivision left on the device.
+#[derive(Clone)]
+struct Parts {
+    params: SubdivisionParams,
+    triangles: Vec<[u32; 4]>,
+    positions: Vec<[f32; 4]>,
+    spheres: Vec<[f32; 4]>,
+    grid: Vec<Grid>,
+    plans: Vec<u32>,
+    sums: Vec<[u32; 2]>,
+    roots: Vec<u32>,
+    parts: Vec<[f32; 4]>,
+    keys: Vec<u32>,
+    registered: Vec<u32>,
+    marks: Vec<u32>,
+    entries: Vec<Entry>,
+}
+
+fn run_parts(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> Parts {
+    let frame = Frame::new(query, &pool(1));
+    let n = mesh.triangles.len();
+    let mut scene = Scene::new(gpu, mesh).unwrap();
+    scene.upload(gpu, query, &frame);
+    let mut cells = Cells::new(gpu, room, 4 * room as usize).unwrap();
+    let mut stage = Subdivision::new(gpu, n as u32, room as usize).unwrap();
+    let params = subdivision::params(&scene, &frame, room, 1.2);
+    let mut recorder = Recorder::new(gpu);
+    scene.record(&mut recorder);
+    stage.record(&mut recorder, &scene, &cells, &params).unwrap();
+    cells.record(&mut recorder, stage.registered(n as u32), &scene.spheres, 32).unwrap();
+    let r = &mut recorder;
+    let copies = [
+        whole(r, &scene.spheres),
+        whole(r, &cells.grid),
+        whole(r, &stage.plans),
+        whole(r, &stage.sums),
+        whole(r, &stage.roots),
+        whole(r, &stage.parts),
+        whole(r, &cells.keys),
+        whole(r, &cells.registered),
+        whole(r, &cells.marks),
+        whole(r, &cells.entries),
+        whole(r, &cells.offsets),
+        whole(r, &cells.kept),
+        whole(r, &scene.status),
+    ];
+    let answer = recorder.run().unwrap();
+    assert_eq!(answer.read::<u32>(copies[12])[status::TOO_FINE as usize], 0);
+    let sums = first(answer.read::<[u32; 2]>(copies[3]), n + 1);
+    let count = sums[n][0] as usize;
+    let registrations = answer.read::<u32>(copies[10])[room as usize] as usize;
+    let kept = answer.read::<u32>(copies[11])[4 * room as usize] as usize;
+    Parts {
+        params,
+        triangles: triangle_words(mesh),
+        positions: frame.positions,
+        spheres: first(answer.read(copies[0]), n),
+        grid: answer.read(copies[1]),
+        plans: first(answer.read(copies[2]), n),
+        sums,
+        roots: first(answer.read(copies[4]), count),
+        parts: first(answer.read(copies[5]), count),
+        keys: first(answer.read(copies[6]), registrations),
+        registered: first(answer.read(copies[7]), registrations),
+        marks: first(answer.read(copies[8]), registrations),
+        entries: first(answer.read(copies[9]), kept),
+    }
+}
+
+/// The first stage of the subdivision that differs from its twin; None if all agree.
+fn part_difference(r: &Parts) -> Option<&'static str> {
+    let sum = twin::subdivision::radius_words(&r.spheres).iter().map(|&w| u64::from(w)).sum();
+    let (grid, _) = twin::subdivision::subdivision_setup(&r.params, sum);
+    let got = r.grid[0];
+    if grid.cells != got.cells || (grid.size - got.size).abs() > ROUNDING * grid.size {
+        return Some("grid");
+    }
+    let mut before = 0;
+    for (t, corners) in r.triangles.iter().enumerate() {
+        let motion = twin::subdivision::motion(&r.params, &r.positions, corners);
+        let plan = |f: f32| {
+            let limit = twin::subdivision::limit(got.size) * f;
+            twin::subdivision::subdivision_plan(r.params.least, limit, r.spheres[t][3], &motion)
+        };
+        // Rounding may decide otherwise where a size is at the limit.
+        let found = (r.plans[t] & 0xff, r.plans[t] >> 8);
+        if ![1.0, 1.0 - ROUNDING, 1.0 + ROUNDING].iter().any(|&f| plan(f) == Some(found)) {
+            return Some("plans");
+        }
+        if r.sums[t] != [before, 0] {
+            return Some("sums");
+        }
+        for number in 0..1 << (2 * found.0 + found.1) {
+            let k = (before + number) as usize;
+            let (weights, times) = twin::subdivision::part(number, found.0, found.1);
+            let sphere = match found {
+                (0, 0) => r.spheres[t],
+                _ => twin::subdivision::part_sphere(&motion, &weights, times),
+            };
+            let is_near = (0..4).all(|c| (sphere[c] - r.parts[k][c]).abs() <= 2.0 * ROUNDING);
+            if !is_near {
+                return Some("parts");
+            }
+            if r.roots[k] != t as u32 {
+                return Some("roots");
+            }
+        }
+        before += 1 << (2 * found.0 + found.1);
+    }
+    if r.sums[r.triangles.len()] != [before, 0] {
+        return Some("sums");
+    }
+    let registrations: Vec<(u64, u32)> =
+        r.keys.iter().zip(&r.registered).map(|(&k, &t)| (k.into(), t)).collect();
+    let marks = twin::subdivision::cells_mark(&registrations, &r.roots);
+    if !marks.iter().map(|&m| u32::from(m)).eq(r.marks.iter().copied()) {
+        return Some("marks");
+    }
+    let kept: Vec<(u32, u32, f32)> = (0..marks.len())
+        .filter(|&k| marks[k])
+        .map(|k| (r.keys[k], r.roots[r.registered[k] as usize]))
+        .map(|(key, root)| (key, root, r.spheres[root as usize][3]))
+        .collect();
+    let entries = r.entries.iter().map(|e| (e.key, e.triangle, e.radius));
+    (!entries.eq(kept)).then_some("entries")
+}
+
+/// Loose triangles of which some are large and some fast.
+fn mixed(n: usize, random: &mut Random) -> (CollisionMesh, Vec<Vec3>, Vec<Vec3>) {
+    let (mesh, mut x_t0, mut x_t1) = scene(n, random);
+    for t in (0..n).step_by(20) {
+        for v in 3 * t..3 * t + 3 {
+            let (by, along) = (random.vector(0.3), Vec3::new(0.7, 0.1 * t as f64 / n as f64, 0.0));
+            x_t0[v] += by;
+            x_t1[v] += if t % 40 == 0 { by } else { by * 0.1 + along };
+        }
+    }
+    (mesh, x_t0, x_t1)
+}
+
+#[test]
+fn subdivision_matches_its_twins() {
+    for options in variants() {
+        let Some(device) = device(options) else { return };
+        let mut random = Random(12);
+        for n in [1, 2, 255, 256, 257, 500] {
+            let (mesh, x_t0, x_t1) = mixed(n, &mut random);
+            for mode in [Mode::Continuous, Mode::Discrete] {
+                let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.001, mode, active: None };
+                let got = run_parts(&device.gpu, &mesh, &query, 1 << 15);
+                assert_eq!(part_difference(&got), None, "{n}, {mode:?}");
+                assert!(n < 100 || got.parts.len() > n + 100, "{} parts", got.parts.len());
+                assert!(n < 100 || got.entries.len() < got.keys.len());
+            }
+        }
+    }
+}
+
+#[test]
+fn planted_faults_of_the_subdivision_are_caught() {
+    let Some(device) = device(variants()[0]) else { return };
+    let (mesh, x_t0, x_t1) = mixed(500, &mut Random(13));
+    let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
+    let good = run_parts(&device.gpu, &mesh, &query, 1 << 15);
+    assert_eq!(part_difference(&good), None);
+    let faults: [(&str, fn(&mut Parts)); 8] = [
+        ("grid", |r| r.grid[0].size *= 1.001),
+        ("plans", |r| r.plans[0] += 1),
+        ("sums", |r| r.sums[1][0] += 1),
+        ("parts", |r| r.parts[10][0] += 1e-4),
+        ("roots", |r| r.roots[0] = 1),
+        ("marks", |r| r.marks[5] ^= 1),
+        ("entries", |r| r.entries[5].triangle ^= 1),
+        ("entries", |r| r.entries.truncate(r.entries.len() - 1)),
+    ];
+    for (stage, fault) in faults {
+        let mut bad = good.clone();
+        fault(&mut bad);
+        assert_eq!(part_difference(&bad), Some(stage));
     }
 }

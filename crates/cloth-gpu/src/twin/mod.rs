@@ -9,3 +9,4 @@ pub mod grid;
 pub mod pairs;
 pub mod scan;
 pub mod sort;
+pub mod subdivision;
