@@ -4,6 +4,9 @@
 //! find, in single precision rounded outward, a superset of the candidate pairs; `cloth_collision` decides them in double
 //! precision with the code that the detectors of the CPU use. So the contacts are the same, with the same times.
 //!
+//! Any Vulkan, Metal or DX12 adapter will do, a software adapter too (Mesa's, package `mesa-vulkan-drivers` on Debian): the tests run
+//! on it, and with `CLOTHSIM_REQUIRE_GPU=1` they fail where there is none.
+//!
 //! One stage has one name: `shaders/<name>.wgsl` (the kernel), [`stages`] (its wrapper), [`twin`] (the same on the CPU).
 
 pub use cloth_collision as collision;

@@ -282,7 +282,11 @@ impl<'a> Recorder<'a> {
         if let Some(buffer) = spare.filter(|b| b.size() >= bytes) {
             return Ok(buffer);
         }
-        let size = bytes.next_power_of_two().max(1 << 16);
+        let most = self.gpu.device.limits().max_buffer_size;
+        if bytes > most {
+            return Err(GpuError::TooLarge { what: "staging".to_owned(), needed: bytes, limit: most });
+        }
+        let size = bytes.next_power_of_two().clamp(1 << 16, most);
         let scope = self.gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("staging"),

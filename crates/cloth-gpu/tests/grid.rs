@@ -111,14 +111,18 @@ fn subdivision_agrees_and_tests_less() {
         let (mut x_t0, mut triangles) = soup(500, 0.03, &mut random);
         triangles.retain(|t| t[0] + 2 == t[2]);
         let (x, mut large) = soup(6, 0.5, &mut random);
-        large.iter_mut().flatten().for_each(|v| *v += x_t0.len() as u32);
+        for v in large.iter_mut().flatten() {
+            *v += x_t0.len() as u32;
+        }
         x_t0.extend(x);
         triangles.extend(large);
         let mut x_t1 = moved(&x_t0, 0.01, &mut random);
         // Some fly across the scene.
         for t in triangles.iter().step_by(50) {
             let by = random.vector(0.8);
-            t.iter().for_each(|&v| x_t1[v as usize] += by);
+            for &v in t {
+                x_t1[v as usize] += by;
+            }
         }
         let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
         for lambda in [0.5, 1.0, 1.2, 3.0] {

@@ -300,7 +300,7 @@ struct Parts {
     plans: Vec<u32>,
     sums: Vec<[u32; 2]>,
     roots: Vec<u32>,
-    parts: Vec<[f32; 4]>,
+    balls: Vec<[f32; 4]>,
     keys: Vec<u32>,
     registered: Vec<u32>,
     marks: Vec<u32>,
@@ -350,7 +350,7 @@ fn run_parts(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> P
         plans: first(answer.read(copies[2]), n),
         sums,
         roots: first(answer.read(copies[4]), count),
-        parts: first(answer.read(copies[5]), count),
+        balls: first(answer.read(copies[5]), count),
         keys: first(answer.read(copies[6]), registrations),
         registered: first(answer.read(copies[7]), registrations),
         marks: first(answer.read(copies[8]), registrations),
@@ -388,7 +388,7 @@ fn part_difference(r: &Parts) -> Option<&'static str> {
                 (0, 0) => r.spheres[t],
                 _ => twin::subdivision::part_sphere(&motion, &weights, times),
             };
-            let is_near = (0..4).all(|c| (sphere[c] - r.parts[k][c]).abs() <= 2.0 * ROUNDING);
+            let is_near = (0..4).all(|c| (sphere[c] - r.balls[k][c]).abs() <= 2.0 * ROUNDING);
             if !is_near {
                 return Some("parts");
             }
@@ -440,12 +440,14 @@ fn subdivision_matches_its_twins() {
                 let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.001, mode, active: None };
                 let got = run_parts(&device.gpu, &mesh, &query, 1 << 15);
                 assert_eq!(part_difference(&got), None, "{n}, {mode:?}");
-                assert!(n < 100 || got.parts.len() > n + 100, "{} parts", got.parts.len());
+                assert!(n < 100 || got.balls.len() > n + 100, "{} parts", got.balls.len());
                 assert!(n < 100 || got.entries.len() < got.keys.len());
             }
         }
     }
 }
+
+type PartFault = fn(&mut Parts);
 
 #[test]
 fn planted_faults_of_the_subdivision_are_caught() {
@@ -454,11 +456,11 @@ fn planted_faults_of_the_subdivision_are_caught() {
     let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
     let good = run_parts(&device.gpu, &mesh, &query, 1 << 15);
     assert_eq!(part_difference(&good), None);
-    let faults: [(&str, fn(&mut Parts)); 8] = [
+    let faults: [(&str, PartFault); 8] = [
         ("grid", |r| r.grid[0].size *= 1.001),
         ("plans", |r| r.plans[0] += 1),
         ("sums", |r| r.sums[1][0] += 1),
-        ("parts", |r| r.parts[10][0] += 1e-4),
+        ("parts", |r| r.balls[10][0] += 1e-4),
         ("roots", |r| r.roots[0] = 1),
         ("marks", |r| r.marks[5] ^= 1),
         ("entries", |r| r.entries[5].triangle ^= 1),
