@@ -56,7 +56,7 @@ compare: build ## Detection side by side with IPC Toolkit, in one run (installs 
 schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 	$(BIN)/clothsim schema > docs/scene.schema.json
 
-validation: build ## Compare with elastica solutions and measured fabrics (minutes); writes validation/*.csv, *.png
+validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
 
 clean: ## Remove what the targets above made

@@ -6,9 +6,9 @@ import argparse
 import sys
 import time
 
-from . import cantilever, drape, loop, peirce, tables, targets
+from . import cantilever, drape, friction, loop, peirce, tables, targets
 
-TESTS = {"cantilever": cantilever.run, "peirce": peirce.run, "loop": loop.run, "drape": drape.run}
+TESTS = {"cantilever": cantilever.run, "peirce": peirce.run, "loop": loop.run, "drape": drape.run, **friction.TESTS}
 
 
 def main() -> int:

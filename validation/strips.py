@@ -21,9 +21,9 @@ KINDS = ("union-jack", "equilateral", "equilateral-along", "one-way")
 # Free length beyond the last pinned column and in front of it, in cells: a half where columns are straight. Edges along
 # the strip stagger the columns; there 3/8 lets the rigidity of a linear strip converge with the square of the cell.
 CLAMP = {"union-jack": 0.5, "equilateral": 0.5, "equilateral-along": 0.375, "one-way": 0.5}
-# Rigidity of an unbounded sheet bent along the strip over that of the material, from the hinge energy: free to curve
-# across, and held flat across (docs/validation.md derives them).
-PLATE = {
+# Rigidity over that of the material of an unbounded sheet of independent hinges bent along the strip: free to curve
+# across, and held flat across (docs/validation.md derives them). With coupled hinges both are 1 on every mesh.
+INDEPENDENT = {
     "union-jack": (4 / 5, 5 / 6),
     "equilateral": (8 / 9, 1.0),
     "equilateral-along": (8 / 9, 1.0),
@@ -94,11 +94,12 @@ def _staggered(rows: int, columns: int, edge: float, apart: float) -> tuple[list
     return points, triangles
 
 
-def linear_rigidity(strip: Strip, length: float) -> float:
+def linear_rigidity(strip: Strip, length: float, hinges: str = "coupled") -> float:
     """Rigidity of the strip over that of its material, as its own small deflections show it.
 
-    Minimises the hinge energy ½ Σ |e| θ²/h̄ of the flat mesh, linear in the displacements normal to it, under its
-    weight, and compares the tip with that of a beam, w g L⁴/(8 B). No stretch enters: this is the mesh's bending alone.
+    Minimises the hinge energy ½ Σ |e| θ²/h̄ of the flat mesh, with the products of the hinges of each triangle unless
+    ``hinges`` is "independent", linear in the displacements normal to it, under its weight, and compares the tip with
+    that of a beam, w g L⁴/(8 B). No stretch enters: this is the mesh's bending alone.
     """
     points = strip.mesh.vertices[:, [0, 2]]
     triangles = strip.mesh.triangles
@@ -111,6 +112,7 @@ def linear_rigidity(strip: Strip, length: float) -> float:
     area = 0.5 * np.abs((q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0])
 
     rows, columns, values, weights = [], [], [], []
+    inner: dict[int, list[tuple[int, np.ndarray, float]]] = {}
     for (a, b), flaps in sides.items():
         if len(flaps) != 2:
             continue
@@ -122,9 +124,20 @@ def linear_rigidity(strip: Strip, length: float) -> float:
             rows += [len(weights)] * 3
             columns += [opposite, a, b]
             values += [slope, -slope * (1.0 - along), -slope * along]
-        weights.append(squared / (area[flaps[0][0]] + area[flaps[1][0]]))
+        first, second = (area[t] for t, _ in flaps)
+        for t, _ in flaps:
+            share = 2.0 * np.sqrt(first * second) / (first + second)
+            inner.setdefault(t, []).append((len(weights), edge, share))
+        weights.append(squared / (first + second))
     angles = sp.csr_matrix((values, (rows, columns)), shape=(len(weights), len(points)))
-    stiffness = (angles.T @ sp.diags(weights) @ angles).tocsr()
+    energy = sp.diags(weights).tolil()
+    for t, hinges_of in inner.items() if hinges == "coupled" else ():
+        for i, d, s in hinges_of:
+            for j, e, r in hinges_of:
+                if i != j:
+                    # |d| |e| cos² of the angle between them.
+                    energy[i, j] = s * r * float(d @ e) ** 2 / np.sqrt(float(d @ d) * float(e @ e)) / (4.0 * area[t])
+    stiffness = (angles.T @ energy.tocsr() @ angles).tocsr()
     load = np.bincount(triangles.ravel(), np.repeat(area / 3.0, 3), len(points))
     free = np.setdiff1d(np.arange(len(points)), strip.pinned)
     droop = np.zeros(len(points))

@@ -23,8 +23,8 @@ DIGITS = 6
 class Result:
     """One row of results.csv.
 
-    ``ours`` against ``target``, both in ``unit``; ``deviation`` [%] as ``measure`` says; ``bound`` [%] is what is
-    claimed, empty where the row informs only.
+    ``ours`` against ``target``, both in ``unit``; ``deviation`` as ``measure`` says, in per cent unless that names a
+    unit; ``bound``, in the same unit, is what is claimed, empty where the row informs only.
     """
 
     test: str

@@ -1,13 +1,13 @@
 """Writes targets.csv: what is compared with, where it comes from.
 
-Solutions of the elastica are computed here; measured values are copied, in the units of their source, and converted.
+Solutions of equations are computed; measured values are copied, in the units of their source, and converted.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from . import cantilever, elastica, loop, tables
+from . import cantilever, elastica, friction, loop, tables
 
 NAMES = (
     "test",
@@ -93,7 +93,7 @@ def rows() -> list[tuple[object, ...]]:
     for name, rigidity, couple, weight, drape, nodes in FABRICS:
         values = (weight * MG_CM2, rigidity * GF_CM2, couple * GF_CM, nodes)
         out.append(("drape", name, "drape coefficient", "%", drape, "measured", *values, MATSUDAIRA, SECOND_HAND))
-    return out
+    return out + friction.rows()
 
 
 def write() -> None:

@@ -1,1 +1,3 @@
 //! Bench bodies by stage and by scene.
+
+pub mod incline;

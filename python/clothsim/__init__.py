@@ -13,7 +13,7 @@ Examples
 (121, 3)
 """
 
-from clothsim import bending, collision, errors
+from clothsim import bending, collision, errors, friction
 from clothsim._core import __version__
 from clothsim.errors import (
     CheckpointError,
@@ -64,6 +64,7 @@ __all__ = [
     "bending",
     "collision",
     "errors",
+    "friction",
     "materials",
     "record",
 ]

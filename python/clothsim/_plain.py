@@ -9,18 +9,21 @@ from typing import Any
 import numpy as np
 
 from clothsim.errors import InvalidScene
+from clothsim.friction import Pair
 
 __all__ = ["plain"]
 
 
 def plain(value: Any, key: str) -> Any:
-    """Turn mappings, sequences and NumPy values into dicts, lists and numbers; ``key`` is named in errors.
+    """Turn mappings, pairs, sequences and NumPy values into dicts, lists and numbers; ``key`` is named in errors.
 
     Raises
     ------
     InvalidScene
         A number is NaN or infinite, or a value is of another type.
     """
+    if isinstance(value, Pair):
+        value = value.to_dict()
     if isinstance(value, Mapping):
         return {str(k): plain(v, f"{key}.{k}" if key else str(k)) for k, v in value.items() if v is not None}
     if isinstance(value, np.ndarray):

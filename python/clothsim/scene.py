@@ -20,6 +20,7 @@ from clothsim._files import write_whole
 from clothsim._formats import RawMesh
 from clothsim._plain import plain
 from clothsim.errors import InvalidInput, InvalidScene, MeshError
+from clothsim.friction import Pair
 from clothsim.material import Material
 from clothsim.mesh import Mesh
 
@@ -67,7 +68,8 @@ class Scene:
     gravity : (3,) array, optional
         Acceleration [m/s²]; 9.81 m/s² against ``up`` by default.
     time, solver, air, contact, output : mapping, optional
-        Tables of a scene file. Without ``contact`` nothing touches anything.
+        Tables of a scene file. Without ``contact`` nothing touches anything. `set_friction` adds friction of two
+        bodies, once they are there.
     cloth, collider : sequence of mappings
         Bodies.
 
@@ -142,7 +144,8 @@ class Scene:
             Unique among all bodies.
         **keys
             Further keys of a ``[[cloth]]`` table: ``position`` [m], ``rotation``, ``velocity`` [m/s],
-            ``velocities`` (n, 3) [m/s], ``rest``, ``warp``, ``self_collision``, ``pins``.
+            ``velocities`` (n, 3) [m/s], ``rest``, ``warp``, ``self_collision``, ``pins``, ``friction``,
+            ``self_friction``, ``strain_limit``.
         """
         table = {"name": name, "mesh": mesh, "material": material, **keys}
         self._append("cloth", self._cloth_table(table, f"cloth[{len(self._data['cloth'])}]"))
@@ -162,6 +165,46 @@ class Scene:
         self._append(
             "collider", self._collider_table({"name": name, **keys}, f"collider[{len(self._data['collider'])}]")
         )
+
+    def set_friction(self, first: str, second: str, friction: float | Pair | Mapping[str, Any]) -> None:
+        """Set the friction of two bodies, before all other entries.
+
+        Parameters
+        ----------
+        first, second : str
+            Names of two bodies of the scene, at least one of them cloth; one name twice is that cloth against itself.
+        friction : float, Pair or mapping
+            Coulomb's coefficient; a pair of `clothsim.friction.pairs`; a table with ``law`` and its parameters.
+
+        Raises
+        ------
+        InvalidScene
+            The scene has no ``contact`` or no such bodies, or the friction is no law.
+
+        Examples
+        --------
+        >>> import clothsim as cs
+        >>> scene = cs.Scene(contact={"friction": 0.3})
+        >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 5, 5), "silk", name="scarf", position=(0.0, 0.6, 0.0))
+        >>> scene.add_collider("arm", shape={"type": "capsule", "radius": 0.05, "half_height": 0.2, "tolerance": 0.01})
+        >>> scene.set_friction("scarf", "arm", cs.friction.pairs["cotton-skin-forearm"])
+        >>> scene.to_dict()["contact"]["pairs"]
+        [{'between': ['scarf', 'arm'], 'friction': {'pair': 'cotton-skin-forearm'}}]
+        """
+        contact = self._data.get("contact")
+        if contact is None:
+            expected = "a table (friction is part of contact)"
+            raise InvalidScene(f"contact: expected {expected}, got nothing", key="contact", expected=expected)
+        before = contact.get("pairs", [])
+        kept = [pair for pair in before if sorted(pair["between"]) != sorted((first, second))]
+        pair = _table({"between": [first, second], "friction": friction}, f"contact.pairs[{len(kept)}]")
+        contact["pairs"] = [*kept, pair]
+        self._core = None
+        try:
+            self.check()
+        except InvalidScene:
+            contact["pairs"] = before
+            raise
 
     def _append(self, kind: str, table: dict[str, Any]) -> None:
         bodies = self._data[kind]

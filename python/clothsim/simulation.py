@@ -252,6 +252,16 @@ class Simulation:
         return self._core.masses()
 
     @property
+    def contact_forces(self) -> Floats:
+        """Force of contact on each cloth vertex in the last step [N], shape (n, 3), strain limits included; a copy.
+
+        The impulses of response and the forces of constraints over the step; zero before the first step and where
+        nothing touches. Per vertex they depend on how contact shares what presses; their sums over a piece of cloth do
+        not.
+        """
+        return self._core.contact_forces()
+
+    @property
     def energy(self) -> dict[str, float]:
         """Mechanical energy of the cloth [J]: kinetic, stretch, shear, bending, gravity, and their total."""
         energy: dict[str, float] = json.loads(self._core.energy())

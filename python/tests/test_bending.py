@@ -158,3 +158,28 @@ def test_the_semi_implicit_scheme_says_where_it_ends() -> None:
     assert any("largest stable step" in warning for warning in plan["warnings"])
     more = cs.Simulation(scene(stiff, integrator="semi-implicit", dt=0.01, bending_substeps=4), threads=1).plan
     assert more["stable_dt"] == pytest.approx(4 * plan["stable_dt"], rel=1e-6)
+
+
+def test_hinges_bend_together_unless_told_otherwise() -> None:
+    """A sheet that hangs from one side moves otherwise; the plan says what is built."""
+
+    def sheet(**keys: str) -> cs.Simulation:
+        scene = cs.Scene(name="sheet", duration=1.0, time={"dt": 0.02}, air={"damping": 10.0})
+        material = {
+            "areal_density": 0.2,
+            "in_plane": {"model": "baraff-witkin", "warp": 1e3, "weft": 1e3, "shear": 1e3},
+            "bending": {"model": "hinge", "rigidity": 2e-2, **keys},
+        }
+        scene.add_cloth(cs.Mesh.grid(0.4, 0.4, 9, 9), material, pins=[{"vertices": list(range(18))}])
+        return cs.Simulation(scene, threads=1)
+
+    coupled, named, alone = sheet(), sheet(hinges="coupled"), sheet(hinges="independent")
+    assert "hinge coupling" in coupled.plan.running
+    assert "hinge coupling" not in alone.plan.running
+    for simulation in (coupled, named, alone):
+        assert "hinge" in simulation.plan.running
+        simulation.advance(1.0)
+    assert np.array_equal(coupled.positions, named.positions)
+    assert coupled.positions[:, 1].min() > 0.95 * alone.positions[:, 1].min()  # stiffer: droops less
+    with pytest.raises(cs.InvalidScene, match="independent"):
+        sheet(hinges="loose")

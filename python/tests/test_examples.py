@@ -38,6 +38,12 @@ def test_scene_files_can_be_planned_and_started(path: Path) -> None:
     sim.step()
 
 
+def test_friction_laws(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    load("friction_laws").main(tmp_path / "laws.png")
+    assert (tmp_path / "laws.png").stat().st_size > 10_000
+
+
 @pytest.mark.data
 def test_detect(ccd_data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert load("detect").main(ccd_data.parent, ("cloth-funnel",)) == 0

@@ -86,27 +86,40 @@ def test_loops_without_weight_are_those_of_the_textbook() -> None:
 def test_linear_rigidity_lies_between_a_free_and_a_flat_sheets(kind: str) -> None:
     strips = module("strips")
     cells = 40
-    low, high = strips.PLATE[kind]
-    got = [strips.linear_rigidity(strips.strip(kind, 0.2, cells, n), 0.2) for n in (8, 40)]
+    low, high = strips.INDEPENDENT[kind]
+    got = [strips.linear_rigidity(strips.strip(kind, 0.2, cells, n), 0.2, "independent") for n in (8, 40)]
     # First-order boundary layers one cell wide remain at the edges of the narrower strip.
     assert low - 0.01 < got[0] < got[1] < high + 0.01
     assert not low - 0.01 < got[1] / 0.8 < high + 0.01
 
 
-# What the tip may be off by at 20 triangles along, of its displacement [%]: twice what 40 are held to.
-COARSE_BOUND = 4.0
+# A strip of coupled hinges has its material's rigidity but for the boundary layers, one cell wide, of 40 cells.
+LAYERS = 0.005
 
 
-@pytest.mark.parametrize("kind", ["union-jack", "equilateral"])
+@pytest.mark.parametrize("kind", ["union-jack", "equilateral", "equilateral-along", "one-way"])
+def test_coupled_hinges_have_the_rigidity_of_the_material(kind: str) -> None:
+    strips = module("strips")
+    cloth = strips.strip(kind, 0.2, 40, 8)
+    assert strips.linear_rigidity(cloth, 0.2) == pytest.approx(1.0, abs=LAYERS)
+    assert strips.linear_rigidity(cloth, 0.2, "independent") != pytest.approx(1.0, abs=LAYERS)
+
+
+# What the tip may be off by at 20 triangles along, of its displacement [%]: half of what 40 are held to.
+COARSE_BOUND = 1.0
+
+
+@pytest.mark.parametrize("kind", ["union-jack", "equilateral", "one-way"])
 def test_cantilever_against_the_elastica(kind: str) -> None:
-    cantilever, strips = module("cantilever"), module("strips")
-    factor = strips.linear_rigidity(strips.strip(kind, cantilever.LENGTH, 20, 4), cantilever.LENGTH)
+    cantilever = module("cantilever")
     for gamma in (1.0, 10.0):
         tip = cantilever.simulate(kind, gamma, 20, 4)
         assert tip.still
-        assert cantilever.deviation(tip, gamma / factor)[0] < COARSE_BOUND
-    wrong = cantilever.simulate(kind, 10.0, 20, 4, rigidity=1.3)
-    assert cantilever.deviation(wrong, 10.0 / factor)[0] > COARSE_BOUND
+        assert cantilever.deviation(tip, gamma)[0] < COARSE_BOUND
+    wrong = cantilever.simulate(kind, 10.0, 20, 4, rigidity=1.05)
+    assert cantilever.deviation(wrong, 10.0)[0] > COARSE_BOUND
+    alone = cantilever.simulate(kind, 10.0, 20, 4, hinges="independent")
+    assert cantilever.deviation(alone, 10.0)[0] > COARSE_BOUND
 
 
 def test_peirce_recovers_the_rigidity(monkeypatch: pytest.MonkeyPatch) -> None:

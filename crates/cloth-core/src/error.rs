@@ -111,6 +111,14 @@ pub enum StepError {
         /// Index of the first wrong entry.
         entry: usize,
     },
+    /// A constraint is out of range, or the method takes none.
+    #[error("constraints: expected {expected}, entry {entry} is not")]
+    Constraint {
+        /// Index of the first wrong entry.
+        entry: usize,
+        /// What was expected of it.
+        expected: &'static str,
+    },
     /// The linear solver broke down.
     #[error("{error}")]
     Solver {

@@ -1,15 +1,16 @@
 //! One piece of cloth: which force models its material calls for.
 
 use crate::{
-    Bending, CoreError, InPlane, Material,
+    Bending, CoreError, HingeCoupling, InPlane, Material,
     bending::{BendingLaw, Linear},
     forces::{
         ForceModel,
+        coupled::Plate,
         hinge::{Hinges, Rest, dihedral_angle},
         spring::{Role, Springs},
         stretch_shear::{Stiffness, StretchShear},
     },
-    mesh::{RestShape, Topology, TriMesh},
+    mesh::{NONE, RestShape, Topology, TriMesh},
 };
 
 /// One piece of cloth and where its vertices lie in the global arrays.
@@ -114,7 +115,7 @@ impl ClothPart<'_> {
                 let lengths = hinges.iter().zip(&rest).map(|(h, r)| self.opposite_distance(h, r)).collect();
                 models.push(Box::new(Springs::new(Role::Bending, stiffness, damping, vertices, lengths)?));
             }
-            Bending::Hinge { rigidity, damping } => {
+            Bending::Hinge { rigidity, damping, .. } => {
                 models.push(self.hinges(Linear::new(rigidity)?, damping * rigidity, rest)?);
             }
             Bending::Nonlinear(given) => {
@@ -141,7 +142,26 @@ impl ClothPart<'_> {
     ) -> Result<Box<dyn ForceModel>, CoreError> {
         let corners = |h: &crate::mesh::Hinge| [h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]];
         let vertices = self.topology.hinges.iter().map(|h| self.global(corners(h))).collect();
-        Ok(Box::new(Hinges::new(law, damping, vertices, rest)?))
+        let hinges = Hinges::new(law, damping, vertices, rest)?;
+        Ok(Box::new(match self.material.bending.hinges() {
+            Some(HingeCoupling::Coupled) => hinges.coupled(&self.plates()),
+            _ => hinges,
+        }))
+    }
+
+    /// The triangles with their hinges.
+    fn plates(&self) -> Vec<Plate> {
+        let mut hinge_of = vec![NONE; self.topology.edges.len()];
+        for (k, hinge) in self.topology.hinges.iter().enumerate() {
+            hinge_of[self.edge_of(hinge)] = k as u32;
+        }
+        let lengths = self.rest.side_lengths.iter().zip(&self.rest.area);
+        let plate = |(edges, (&lengths, &area)): (&[u32; 3], (&[f64; 3], &f64))| Plate {
+            hinges: edges.map(|e| hinge_of[e as usize]),
+            lengths,
+            area,
+        };
+        self.topology.triangle_edges.iter().zip(lengths).map(plate).collect()
     }
 
     /// Rest length of each edge: the mean over the triangles that have it, whose panels may differ at a seam [m].

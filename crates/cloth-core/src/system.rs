@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use crate::{
     ClothPart, CoreError, EffectInfo, Energy, Environment,
     assembly::{
-        Corners, ELEMENTS_PER_CHUNK, ElementBuffers, ForceClock, ROWS_PER_CHUNK, part, parts_mut, timed,
+        Corners, ELEMENTS_PER_CHUNK, ElementBuffers, ForceClock, ROWS_PER_CHUNK, part, parts_mut, surveyed,
+        timed,
     },
     bending::HingeState,
-    forces::{ForceModel, Linear, air::Air},
+    forces::{ForceModel, Linear, Survey, air::Air},
     mesh::Vec3,
 };
 
@@ -239,7 +240,13 @@ impl ClothSystem {
     pub fn energy(&self, x: &[Vec3], v: &[Vec3]) -> Energy {
         let mut energy = Energy::default();
         for ((model, _), memory) in self.all_models().zip(self.memory_by_model(x)) {
-            model.add_energy(0..model.count(), x, &memory, &mut energy);
+            let all = 0..model.count();
+            let mut survey = Survey::new(model);
+            if !survey.work.is_empty() {
+                let Survey { elastic, work } = &mut survey;
+                model.survey(all.clone(), x, &memory, Survey { elastic, work });
+            }
+            model.add_energy(all.clone(), x, &memory, surveyed(&survey, all), &mut energy);
         }
         for ((m, x), v) in self.masses.iter().zip(x).zip(v) {
             energy.kinetic += 0.5 * m * v.norm_squared();
@@ -272,6 +279,16 @@ impl ClothSystem {
             effects.push(EffectInfo { name: "air-damping", elements, bytes: 0 });
         }
         effects
+    }
+
+    /// What coupling the hinges takes: hinges coupled and memory; 0 where no material asks for it.
+    pub fn hinge_coupling(&self) -> EffectInfo {
+        let none = EffectInfo { name: "hinge coupling", elements: 0, bytes: 0 };
+        self.all_models().filter_map(|(model, _)| model.coupled()).fold(none, |sum, own| EffectInfo {
+            elements: sum.elements + own.elements,
+            bytes: sum.bytes + own.bytes,
+            ..sum
+        })
     }
 
     /// Seconds of each effect by name, in the order of [`Self::effects`]; models of one name are summed.
@@ -327,7 +344,7 @@ impl ClothSystem {
     /// Gravity and air damping go before, as accelerations in passes of their own, and are timed. The corner forces of
     /// all models are taken in one pass over the vertices, which has no part per model.
     pub(crate) fn gather(&self, corners: &mut Corners, v: &[Vec3], scale: f64, out: &mut [Vec3]) {
-        let Corners { forces, clock } = corners;
+        let Corners { forces, clock, .. } = corners;
         if self.gravity == Vec3::zeros() {
             out.fill(Vec3::zeros());
         } else {
@@ -353,10 +370,12 @@ impl ClothSystem {
     }
 
     /// Elastic and gravity energy, and the potential of air damping over a step: what the forces on a step's end are
-    /// the gradient of where no model dissipates. Summed by chunks in order. Call on the pool.
-    pub(crate) fn potential(&self, x: &[Vec3], v: &[Vec3], dt: f64, clock: &mut ForceClock) -> f64 {
+    /// the gradient of where no model dissipates. Summed by chunks in order. Call on the pool, with the corners that forces at
+    /// `x` were evaluated in last.
+    pub(crate) fn potential(&self, x: &[Vec3], v: &[Vec3], dt: f64, corners: &mut Corners) -> f64 {
         let mut sum = 0.0;
-        for ((model, memory), seconds) in self.models.iter().zip(&self.memory).zip(&mut clock.models) {
+        let clocks = corners.surveys.iter().zip(&mut corners.clock.models);
+        for ((model, memory), (survey, seconds)) in self.models.iter().zip(&self.memory).zip(clocks) {
             let count = model.count();
             let parts: Vec<f64> = timed(seconds, || {
                 (0..count.div_ceil(ELEMENTS_PER_CHUNK))
@@ -365,7 +384,8 @@ impl ClothSystem {
                         let start = chunk * ELEMENTS_PER_CHUNK;
                         let mut energy = Energy::default();
                         let range = start..(start + ELEMENTS_PER_CHUNK).min(count);
-                        model.add_energy(range.clone(), x, part(memory, count, range), &mut energy);
+                        let memory = part(memory, count, range.clone());
+                        model.add_energy(range.clone(), x, memory, surveyed(survey, range), &mut energy);
                         energy.elastic()
                     })
                     .collect()

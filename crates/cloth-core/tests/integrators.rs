@@ -5,8 +5,8 @@
 mod support;
 
 use cloth_core::{
-    Bending, Environment, InPlane, Integrator, IntegratorParams, Material, Method, Pins, Psd, SolverMethod,
-    SolverParams, StepError, mesh::Vec3,
+    Bending, Environment, HingeCoupling, InPlane, Integrator, IntegratorParams, Material, Method, Pins, Psd,
+    SolverMethod, SolverParams, StepError, mesh::Vec3,
 };
 use support::{FREE, SOFT, SPRINGS, distance, integrator, params, sheet, system, undamped, wavy};
 
@@ -162,7 +162,10 @@ fn bending_sub_steps_set_the_limit_of_the_semi_implicit_scheme() {
     const STEPS: usize = 2000;
     let still = Environment { gravity: Vec3::zeros(), ..Environment::default() };
     let mesh = sheet(0.5, 7);
-    let stiff = Material { bending: Bending::Hinge { rigidity: 0.05, damping: 0.0 }, ..SOFT };
+    let stiff = Material {
+        bending: Bending::Hinge { rigidity: 0.05, damping: 0.0, hinges: HingeCoupling::Coupled },
+        ..SOFT
+    };
     let mut limits = Vec::new();
     for sub_steps in [1, 3] {
         let mut params = params(Method::SemiImplicit);

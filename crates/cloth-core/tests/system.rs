@@ -5,7 +5,8 @@
 mod support;
 
 use cloth_core::{
-    Bending, ClothPart, ClothSystem, CoreError, Environment, InPlane, Integrator, IntegratorParams, Material,
+    Bending, ClothPart, ClothSystem, CoreError, Environment, HingeCoupling, InPlane, Integrator,
+    IntegratorParams, Material,
     material::library,
     mesh::{RestShape, Topology, TriMesh, Vec3},
 };
@@ -21,7 +22,7 @@ fn only_what_is_called_for_is_built() {
     assert_eq!(names(&SOFT, &space), ["baraff-witkin", "hinge"]);
     assert_eq!(names(&SPRINGS, &Environment::default()), ["spring", "bending-spring", "gravity"]);
     assert_eq!(names(&Material { bending: Bending::None, ..SOFT }, &space), ["baraff-witkin"]);
-    let limp = Bending::Hinge { rigidity: 0.0, damping: 1.0 };
+    let limp = Bending::Hinge { rigidity: 0.0, damping: 1.0, hinges: HingeCoupling::Coupled };
     assert_eq!(names(&Material { bending: limp, ..SOFT }, &space), ["baraff-witkin"]);
     let loose = InPlane::Spring { stiffness: 0.0, damping: 0.0 };
     assert_eq!(
@@ -94,7 +95,10 @@ fn energies_by_hand() {
 fn a_cylinder_bends_with_the_rigidity_of_the_material() {
     let (n, length, radius, rigidity) = (41, 0.4, 0.5, 3e-4);
     let mesh = sheet(length, n);
-    let material = Material { bending: Bending::Hinge { rigidity, damping: 0.0 }, ..SOFT };
+    let material = Material {
+        bending: Bending::Hinge { rigidity, damping: 0.0, hinges: HingeCoupling::Coupled },
+        ..SOFT
+    };
     let system = system(&mesh, &material, &Environment { gravity: Vec3::zeros(), ..Environment::default() });
     let x: Vec<Vec3> = mesh
         .vertices
@@ -158,8 +162,14 @@ fn bad_materials_and_surroundings_name_the_parameter() {
     expect(bw(1.0, 1.0, f64::INFINITY, 0.0), "in_plane.shear");
     expect(bw(1.0, 1.0, 1.0, -0.1), "in_plane.damping");
     let bends = |bending| Material { bending, ..SOFT };
-    expect(bends(Bending::Hinge { rigidity: -1.0, damping: 0.0 }), "bending.rigidity");
-    expect(bends(Bending::Hinge { rigidity: 1.0, damping: f64::NAN }), "bending.damping");
+    expect(
+        bends(Bending::Hinge { rigidity: -1.0, damping: 0.0, hinges: HingeCoupling::Coupled }),
+        "bending.rigidity",
+    );
+    expect(
+        bends(Bending::Hinge { rigidity: 1.0, damping: f64::NAN, hinges: HingeCoupling::Coupled }),
+        "bending.damping",
+    );
     expect(bends(Bending::Spring { stiffness: -1.0, damping: 0.0 }), "bending.stiffness");
     let env = Environment { drag: -1.0, ..Environment::default() };
     assert!(env.check().unwrap_err().to_string().starts_with("air.drag"));

@@ -7,6 +7,7 @@ mod collision;
 mod convert;
 mod detach;
 mod errors;
+mod friction;
 mod mesh;
 mod scene;
 mod simulation;
@@ -30,6 +31,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(mesh::cuboid, module)?)?;
 
     module.add_function(wrap_pyfunction!(bending::bending_trace, module)?)?;
+
+    module.add_function(wrap_pyfunction!(friction::friction_force, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::friction_pairs, module)?)?;
+    module.add_function(wrap_pyfunction!(friction::friction_sources, module)?)?;
 
     module.add_function(wrap_pyfunction!(collision::detect, module)?)?;
     module.add_function(wrap_pyfunction!(collision::vertex_triangle_ccd, module)?)?;

@@ -123,6 +123,12 @@ impl PySimulation {
         points_to_numpy(py, &points)
     }
 
+    /// Force of contact on each cloth vertex in the last step [N], (n, 3); a copy.
+    fn contact_forces<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let forces = self.read(py, Simulation::contact_forces);
+        points_to_numpy(py, &forces)
+    }
+
     /// Lumped mass of each cloth vertex [kg], (n,); a copy.
     fn masses<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.read(py, |simulation| simulation.masses().to_vec()).into_pyarray(py)

@@ -1,6 +1,7 @@
 //! Pairs that collide during the step: found, judged, answered by impulses.
 
 use crate::ResponseError;
+use crate::friction::kernel::Kernel;
 use crate::impulse::{Contact, NormalLaw};
 use crate::motion::Motion;
 use crate::repulsion::rest_gap;
@@ -51,25 +52,26 @@ impl Hit {
 
     /// The contact at the time of impact: along its normal the pair ends the step at its rest gap, or at its gap at
     /// the start where that is less, but no nearer than a tenth of the rest gap. `None` if all vertices are prescribed.
-    pub(crate) fn contact(
+    pub(crate) fn contact<K: Kernel>(
         &self,
         mesh: &CollisionMesh,
         params: &ResponseParams,
         rest_x: &[Vec3],
         motion: &Motion<'_>,
-    ) -> Option<Contact> {
+        kernel: &K,
+    ) -> Option<Contact<K::State>> {
         let at_contact = match self.kind {
             StencilKind::VertexTriangle => stencil_at_contact_vertex_triangle,
             StencilKind::EdgeEdge => stencil_at_contact_edge_edge,
         };
         let (x_t0, x_t1) = (motion.x_t0, &motion.buffers.end);
         let stencil = at_contact(mesh, self.pair, self.time, x_t0, x_t1);
-        let gap = rest_gap(&stencil, mesh, params.thickness, rest_x);
+        let gap = rest_gap(&stencil, mesh, params, rest_x);
         let start: Vec3 = (0..4).map(|k| x_t0[stencil.vertices[k] as usize] * stencil.weights[k]).sum();
         let gap_t0 = stencil.normal.dot(&start);
         let gap_t1 = gap_t0.clamp(LEAST_GAP * gap, gap);
         let law = NormalLaw { least: (gap_t1 - gap_t0) / motion.dt, spring: 0.0, cap: f64::NEG_INFINITY };
-        let friction = params.friction.coefficient(mesh, self.vertices[0], self.vertices[3]);
+        let friction = kernel.state(&params.friction, mesh, self.vertices[0], self.vertices[3]);
         Contact::new(&stencil, motion.inv_mass, law, friction)
     }
 }

@@ -43,4 +43,13 @@ pub enum ResponseError {
         /// All vertices of these pairs, sorted, once each.
         vertices: Vec<u32>,
     },
+    /// Edges stay beyond their strain limits: prescribed motions pull them apart, or contact leaves no room. Retry with
+    /// a smaller step.
+    #[error("{} edges stay beyond their strain limit, by up to {excess:.1e} of their length, first {:?}", edges.len(), edges.iter().take(4).collect::<Vec<_>>())]
+    Strained {
+        /// Their vertices, in the order in which the limits were given.
+        edges: Vec<[u32; 2]>,
+        /// How far the worst of them is beyond, as a fraction of its rest length.
+        excess: f64,
+    },
 }

@@ -19,7 +19,7 @@
 //! the sweeps converge whatever the number of contacts on a vertex. λ never falls below 0: nothing attracts.
 
 use crate::Vec3;
-use crate::friction::into_cone;
+use crate::friction::kernel::Kernel;
 use cloth_collision::Stencil;
 
 /// Lower bounds of the normal impulse, see the head of this file.
@@ -42,9 +42,9 @@ impl NormalLaw {
     }
 }
 
-/// A contact with its accumulated impulse.
+/// A contact with its accumulated impulse; `S`: what it knows about its friction.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Contact {
+pub(crate) struct Contact<S> {
     pub(crate) vertices: [u32; 4],
     pub(crate) weights: [f64; 4],
     /// w_k/m_k [1/kg].
@@ -53,14 +53,14 @@ pub(crate) struct Contact {
     /// Effective mass [kg].
     pub(crate) mass: f64,
     pub(crate) law: NormalLaw,
-    friction: f64,
+    pub(crate) friction: S,
     /// On the first point [N s].
     pub(crate) impulse: Vec3,
 }
 
-impl Contact {
+impl<S: Copy> Contact<S> {
     /// The contact of a stencil, without impulse. `None` if all its vertices are prescribed.
-    pub(crate) fn new(stencil: &Stencil, inv_mass: &[f64], law: NormalLaw, friction: f64) -> Option<Self> {
+    pub(crate) fn new(stencil: &Stencil, inv_mass: &[f64], law: NormalLaw, friction: S) -> Option<Self> {
         let mut share = [0.0; 4];
         let mut inverse = 0.0;
         for k in 0..4 {
@@ -84,27 +84,30 @@ impl Contact {
         (0..4).map(|k| velocity[self.vertices[k] as usize] * self.weights[k]).sum()
     }
 
-    /// The change of the impulse that fulfils the law and Coulomb's cone now, and the change of the relative
+    /// The change of the impulse that fulfils the law and that of friction now, and the change of the relative
     /// velocity that it makes [m/s].
-    pub(crate) fn correction(&self, velocity: &[Vec3]) -> (Vec3, f64) {
+    pub(crate) fn correction<K: Kernel<State = S>>(&mut self, kernel: &K, velocity: &[Vec3]) -> (Vec3, f64) {
         let u = self.relative(velocity);
         let (v_n, lambda) = (self.normal.dot(&u), self.normal.dot(&self.impulse));
         let normal_impulse = self.law.impulse(lambda, v_n, self.mass);
         let mut change = self.normal * (normal_impulse - lambda);
         let tangential = self.impulse - self.normal * lambda;
-        if self.friction > 0.0 && (normal_impulse > 0.0 || lambda > 0.0) {
+        if kernel.acts(&self.friction) && (normal_impulse > 0.0 || lambda > 0.0) {
             let wanted = tangential - (u - self.normal * v_n) * self.mass;
-            change += into_cone(wanted, self.friction * normal_impulse) - tangential;
+            change += kernel.bound(&mut self.friction, wanted, normal_impulse, self.mass) - tangential;
         }
         (change, change.norm() / self.mass)
     }
 
-    /// Applies a change of the impulse.
-    pub(crate) fn apply(&mut self, change: Vec3, velocity: &mut [Vec3]) {
+    /// Applies a change of the impulse; `moved` hears of each vertex whose velocity changes.
+    #[inline]
+    pub(crate) fn apply(&mut self, change: Vec3, velocity: &mut [Vec3], mut moved: impl FnMut(usize)) {
         self.impulse += change;
         for k in 0..4 {
             if self.share[k] != 0.0 {
-                velocity[self.vertices[k] as usize] += change * self.share[k];
+                let v = self.vertices[k] as usize;
+                velocity[v] += change * self.share[k];
+                moved(v);
             }
         }
     }
@@ -133,6 +136,7 @@ impl Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::friction::kernel::Coulomb;
     use cloth_collision::StencilKind;
 
     /// Rounding of a handful of operations on numbers of size 1.
@@ -160,10 +164,10 @@ mod tests {
         law: NormalLaw,
         mu: f64,
         velocity: &mut [Vec3],
-    ) -> Contact {
+    ) -> Contact<f64> {
         let mut contact = Contact::new(stencil, &inv_mass, law, mu).expect("a free vertex");
-        let (change, _) = contact.correction(velocity);
-        contact.apply(change, velocity);
+        let (change, _) = contact.correction(&Coulomb::default(), velocity);
+        contact.apply(change, velocity, |_| ());
         contact
     }
 
@@ -236,7 +240,7 @@ mod tests {
         let contact = solve(&vertex_triangle(), [1.0, 0.0, 0.0, 0.0], INELASTIC, 0.0, &mut v);
         assert!(contact.relative(&v).norm() < ROUNDING);
         assert_eq!(&v[1..], &[Vec3::zeros(); 3]);
-        assert!(Contact::new(&vertex_triangle(), &[0.0; 4], INELASTIC, 0.0).is_none());
+        assert!(Contact::new(&vertex_triangle(), &[0.0; 4], INELASTIC, 0.0_f64).is_none());
     }
 
     /// One relaxation fulfils the contact's own law: the second changes nothing.
@@ -245,8 +249,8 @@ mod tests {
         let law = NormalLaw { least: 0.0, spring: 0.1, cap: 0.01 };
         for mu in [0.0, 0.1, 10.0] {
             let mut v = [Vec3::new(0.7, -0.4, 0.2), Vec3::x(), Vec3::zeros(), Vec3::zeros()];
-            let contact = solve(&vertex_triangle(), [1.0, 2.0, 3.0, 0.0], law, mu, &mut v);
-            assert!(contact.correction(&v).1 < ROUNDING);
+            let mut contact = solve(&vertex_triangle(), [1.0, 2.0, 3.0, 0.0], law, mu, &mut v);
+            assert!(contact.correction(&Coulomb::default(), &v).1 < ROUNDING);
         }
     }
 }

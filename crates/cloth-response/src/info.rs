@@ -25,6 +25,18 @@ pub struct ResponseInfo {
     pub exempt: usize,
     /// Pairs that still collide, exempt ones aside: always 0 in an accepted step.
     pub remaining: usize,
+    /// Contacts with friction that carry an impulse and stick.
+    pub sticking: usize,
+    /// Contacts with friction that carry an impulse and slide.
+    pub sliding: usize,
+    /// Edges of cloth that strain limiting pulled or pushed.
+    pub limited_edges: usize,
+    /// Times that the strain limits were linearised anew.
+    pub strain_passes: usize,
+    /// Largest stretch l/l₀ − 1 of a limited edge after the step [-]; 0 without limits.
+    pub largest_stretch: f64,
+    /// Largest compression 1 − l/l₀ of an edge whose compression is limited, after the step [-]; 0 without limits.
+    pub largest_compression: f64,
     /// Seconds per stage, in the order in which the stages run.
     pub seconds: Vec<(&'static str, f64)>,
 }

@@ -1,6 +1,6 @@
 //! What the response may do: thickness, stiffness, friction, caps. Checked once, when the responder is built.
 
-use crate::ResponseError;
+use crate::{FrictionRule, ResponseError};
 
 /// Parameters of the response; [`ResponseParams::default`] suits garments and tablecloths at dt = 1–8 ms.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,7 +10,7 @@ pub struct ResponseParams {
     /// Elastic stiffness k_r of one contact [N/m], ≥ 0 (3.36). A resting contact that carries the force F stays at
     /// an overlap of at most F/k_r; the speed of separation is capped, so a large value does not bounce.
     pub repulsion_stiffness: f64,
-    /// Coulomb coefficients by pair of bodies.
+    /// The friction law of each pair of bodies.
     pub friction: FrictionRule,
     /// Cap on continuous-detection passes that answer with impulses.
     pub max_passes: usize,
@@ -21,6 +21,9 @@ pub struct ResponseParams {
     pub max_sweeps: usize,
     /// A contact whose relative velocity is off by less than this is left alone [m/s], > 0.
     pub velocity_tolerance: f64,
+    /// Cloth vertices carry on colliders, held by something else: edges and vertices of colliders rest on cloth only at half of
+    /// the thickness, so that they stay idle where surfaces are nearly flat.
+    pub vertices_carry: bool,
     /// Pairs in contact already at `x_t0` are exempt from acceptance and counted. Without this they make the step
     /// [`ResponseError::Unresolved`].
     pub allow_initial_contacts: bool,
@@ -36,28 +39,9 @@ impl Default for ResponseParams {
             max_zone_passes: 8,
             max_sweeps: 15,
             velocity_tolerance: 1e-6,
+            vertices_carry: false,
             allow_initial_contacts: false,
         }
-    }
-}
-
-/// Which Coulomb coefficient a pair of bodies has [-].
-///
-/// The collider's entry of `bodies` where one of the two is a collider (not dynamic), else `self_friction`, which is
-/// for cloth against itself and other cloth.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FrictionRule {
-    /// Cloth against cloth, ≥ 0.
-    pub self_friction: f64,
-    /// One per body of the collision mesh, ≥ 0; entries of dynamic bodies are not read. Empty: `default` for all.
-    pub bodies: Vec<f64>,
-    /// Cloth against colliders where `bodies` is empty, ≥ 0.
-    pub default: f64,
-}
-
-impl Default for FrictionRule {
-    fn default() -> Self {
-        Self { self_friction: 0.2, bodies: Vec::new(), default: 0.3 }
     }
 }
 
@@ -65,8 +49,8 @@ impl ResponseParams {
     /// Checks every range.
     ///
     /// # Errors
-    /// [`ResponseError::Parameter`] naming the first value out of range, [`ResponseError::Length`] if `friction.bodies`
-    /// is neither empty nor `body_count` long.
+    /// [`ResponseError::Parameter`] naming the first value out of range, [`ResponseError::Length`] if the friction rule is a
+    /// table for another number of bodies than `body_count`.
     pub fn check(&self, body_count: usize) -> Result<(), ResponseError> {
         let positive = "a finite number > 0";
         let not_negative = "a finite number ≥ 0";
@@ -74,11 +58,8 @@ impl ResponseParams {
             ("thickness", self.thickness, positive),
             ("velocity_tolerance", self.velocity_tolerance, positive),
             ("repulsion_stiffness", self.repulsion_stiffness, not_negative),
-            ("friction.self_friction", self.friction.self_friction, not_negative),
-            ("friction.default", self.friction.default, not_negative),
         ];
-        let bodies = self.friction.bodies.iter().map(|&mu| ("friction.bodies", mu, not_negative));
-        for (name, got, expected) in checks.into_iter().chain(bodies) {
+        for (name, got, expected) in checks {
             let inside = got.is_finite() && if expected == positive { got > 0.0 } else { got >= 0.0 };
             if !inside {
                 return Err(ResponseError::Parameter { name, expected, got });
@@ -89,36 +70,33 @@ impl ResponseParams {
                 return Err(ResponseError::Parameter { name, expected: "at least 1", got: 0.0 });
             }
         }
-        if !self.friction.bodies.is_empty() && self.friction.bodies.len() != body_count {
-            return Err(ResponseError::Length {
-                name: "friction.bodies",
-                expected: body_count,
-                got: self.friction.bodies.len(),
-            });
-        }
-        Ok(())
+        self.friction.check(body_count)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::FrictionLaw;
 
     /// Name the first value out of range and accept the defaults.
     #[test]
     fn ranges_are_checked() {
         assert_eq!(ResponseParams::default().check(3), Ok(()));
-        let bad = |change: fn(&mut ResponseParams)| {
+        let bad = |change: &dyn Fn(&mut ResponseParams)| {
             let mut params = ResponseParams::default();
             change(&mut params);
             params.check(2).expect_err("out of range").to_string()
         };
-        assert!(bad(|p| p.thickness = -0.1).contains("thickness"));
-        assert!(bad(|p| p.thickness = f64::NAN).contains("thickness"));
-        assert!(bad(|p| p.repulsion_stiffness = -1.0).contains("repulsion_stiffness"));
-        assert!(bad(|p| p.friction.self_friction = -1.0).contains("self_friction"));
-        assert!(bad(|p| p.friction.bodies = vec![0.1, -0.1]).contains("friction.bodies"));
-        assert!(bad(|p| p.friction.bodies = vec![0.1; 3]).contains("friction.bodies"));
-        assert!(bad(|p| p.max_passes = 0).contains("max_passes"));
+        assert!(bad(&|p| p.thickness = -0.1).contains("thickness"));
+        assert!(bad(&|p| p.thickness = f64::NAN).contains("thickness"));
+        assert!(bad(&|p| p.repulsion_stiffness = -1.0).contains("repulsion_stiffness"));
+        let law = FrictionLaw::Coulomb { mu_c: 0.1 };
+        assert!(
+            bad(&|p| p.friction = FrictionRule::uniform(FrictionLaw::Coulomb { mu_c: -1.0 }))
+                .contains("mu_c")
+        );
+        assert!(bad(&|p| p.friction = FrictionRule::from_pairs(3, |_, _| law)).contains("friction"));
+        assert!(bad(&|p| p.max_passes = 0).contains("max_passes"));
     }
 }

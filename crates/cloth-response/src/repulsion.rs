@@ -16,10 +16,11 @@
 //! Rest gap: h for a vertex on a triangle. For two edges it is [`EDGE_GAP`] h: where surfaces are flat the vertices carry,
 //! and the edges between them, which add nothing but redundant contacts, stay idle; at a sharp edge the edges carry.
 
+use crate::friction::kernel::Kernel;
 use crate::impulse::{Contact, NormalLaw};
+use crate::landing::Landed;
 use crate::motion::Motion;
 use crate::{ResponseParams, Vec3};
-use cloth_collision::distance::{edge_edge, vertex_triangle};
 use cloth_collision::{CollisionMesh, Stencil, StencilKind};
 
 /// Pairs up to this multiple of the thickness are looked at: falling from the rest gap by g dt² in one step
@@ -27,19 +28,30 @@ use cloth_collision::{CollisionMesh, Stencil, StencilKind};
 pub(crate) const BAND: f64 = 1.25;
 /// Rest gap of two edges as a fraction of the thickness.
 pub(crate) const EDGE_GAP: f64 = 0.75;
+/// Rest gap of what does not carry where [`ResponseParams::vertices_carry`], as a fraction of the thickness.
+const CARRIED_GAP: f64 = 0.5;
 /// Pairs of one cloth rest at no more than this fraction of their distance in the undeformed shape.
 const REST_FRACTION: f64 = 0.5;
 /// The fraction of the overlap that one step may undo (3.36).
 const PUSH_FRACTION: f64 = 0.1;
-/// Least cosine between the normals at the start and at the candidate end of one contact.
-const LEAST_AGREEMENT: f64 = 0.5;
 
 /// The pair's rest gap [m].
 ///
 /// `rest_x`: undeformed positions, or empty.
-pub(crate) fn rest_gap(stencil: &Stencil, mesh: &CollisionMesh, thickness: f64, rest_x: &[Vec3]) -> f64 {
-    let mut gap = thickness;
+pub(crate) fn rest_gap(
+    stencil: &Stencil,
+    mesh: &CollisionMesh,
+    params: &ResponseParams,
+    rest_x: &[Vec3],
+) -> f64 {
+    let mut gap = params.thickness;
     let body = |k: usize| mesh.vertex_body[stencil.vertices[k] as usize];
+    if params.vertices_carry {
+        let [first, second] = [0, 3].map(|k| mesh.bodies[body(k) as usize].dynamic);
+        if first != second && !(first && stencil.kind == StencilKind::VertexTriangle) {
+            return CARRIED_GAP * gap;
+        }
+    }
     if !rest_x.is_empty() && body(0) == body(3) {
         let apart: Vec3 = (0..4).map(|k| rest_x[stencil.vertices[k] as usize] * stencil.weights[k]).sum();
         gap = gap.min(REST_FRACTION * apart.norm());
@@ -63,45 +75,17 @@ fn law(gap_t0: f64, gap_t1: f64, v_n: f64, gap: f64, stiffness: f64, dt: f64) ->
     }
 }
 
-/// The stencil with the closest points at the candidate end of the step.
-///
-/// Where a pair slides by more than a fraction of its gap, the closest points and the normal at the start would take
-/// the motion along the surface for an approach (a card could not slide over a vertex of the plane). `None` if the
-/// pair turns too far to be the same contact, or two edges no longer cross.
-fn at_end(stencil: &Stencil, x_t1: &[Vec3]) -> Option<Stencil> {
-    let p = stencil.vertices.map(|v| x_t1[v as usize]);
-    let weights = match stencil.kind {
-        StencilKind::VertexTriangle => {
-            let w = vertex_triangle::closest_point(&p);
-            [1.0, -w[0], -w[1], -w[2]]
-        }
-        StencilKind::EdgeEdge => {
-            let (s, t) = edge_edge::closest_points(&p);
-            if s <= 0.0 || s >= 1.0 || t <= 0.0 || t >= 1.0 {
-                return None;
-            }
-            [1.0 - s, s, t - 1.0, -t]
-        }
-    };
-    let r: Vec3 = (1..4).map(|k| (p[k] - p[0]) * weights[k]).sum();
-    let distance = r.norm();
-    (stencil.normal.dot(&r) > LEAST_AGREEMENT * distance).then(|| Stencil {
-        weights,
-        normal: r / distance,
-        distance,
-        ..*stencil
-    })
-}
-
 /// The contact of a near pair; `None` if it cannot act or all its vertices are prescribed.
-pub(crate) fn contact(
-    stencil: &Stencil,
+pub(crate) fn contact<K: Kernel>(
+    landed: &Landed,
     mesh: &CollisionMesh,
     params: &ResponseParams,
     rest_x: &[Vec3],
     motion: &Motion<'_>,
-) -> Option<Contact> {
-    let gap = rest_gap(stencil, mesh, params.thickness, rest_x);
+    kernel: &K,
+) -> Option<Contact<K::State>> {
+    let stencil = &landed.start;
+    let gap = rest_gap(stencil, mesh, params, rest_x);
     let gap_t0 = stencil.distance;
     if gap_t0 > BAND * gap {
         return None;
@@ -111,11 +95,11 @@ pub(crate) fn contact(
         s.normal.dot(&u)
     };
     let dt = motion.dt;
-    let (stencil, gap_t1) = match at_end(stencil, &motion.buffers.end) {
+    let (stencil, gap_t1) = match landed.end {
         Some(end) => (end, end.distance),
         None => (*stencil, gap_t0 + dt * normal_velocity(stencil)),
     };
     let law = law(gap_t0, gap_t1, normal_velocity(&stencil), gap, params.repulsion_stiffness, dt);
-    let friction = params.friction.coefficient(mesh, stencil.vertices[0], stencil.vertices[3]);
+    let friction = kernel.state(&params.friction, mesh, stencil.vertices[0], stencil.vertices[3]);
     Contact::new(&stencil, motion.inv_mass, law, friction)
 }

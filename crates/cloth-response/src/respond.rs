@@ -1,16 +1,14 @@
-//! One step's response, stages in reading order.
+//! The responder: what goes in, what comes out, what is kept between steps.
 
-use crate::collisions::{APPROACH, Detection, Hit, look_again, unresolved};
-use crate::frames::Frames;
-use crate::hold::hold_back;
-use crate::motion::{Motion, MotionBuffers, bytes_of};
-use crate::repulsion::{self, BAND};
+use crate::collisions::Detection;
+use crate::friction::general::General;
+use crate::friction::kernel::Coulomb;
+use crate::motion::{Motion, MotionBuffers};
+use crate::stages::Stages;
+use crate::strain::limiter::Limiter;
 use crate::sweeps::ContactSet;
-use crate::zones::{Zones, move_zones};
-use crate::{ResponseError, ResponseInfo, ResponseParams, Vec3};
-use cloth_collision::{Bvh, CollisionMesh, Detector, StencilKind};
-use std::collections::HashSet;
-use std::time::Instant;
+use crate::{LimitedEdge, ResponseError, ResponseInfo, ResponseParams, Vec3};
+use cloth_collision::{Bvh, CollisionMesh, Detector};
 
 /// Turns the unconstrained end of a step into an accepted one.
 ///
@@ -18,14 +16,15 @@ use std::time::Instant;
 /// arguments alone, and not on the number of threads.
 pub struct Responder {
     params: ResponseParams,
-    rest_x: Vec<Vec3>,
     buffers: MotionBuffers,
-    contacts: ContactSet,
-    frames: Frames,
-    zones: Zones,
-    hits: Vec<Hit>,
-    /// Contacts on sides and corners that are in the set already.
-    shared: HashSet<[u32; 4]>,
+    contacts: Contacts,
+    stages: Stages,
+}
+
+/// The contacts, with the kernel of friction that the scene asks for.
+enum Contacts {
+    Coulomb(ContactSet<Coulomb>),
+    General(ContactSet<General>),
 }
 
 impl Responder {
@@ -36,42 +35,58 @@ impl Responder {
     pub fn new(mesh: &CollisionMesh, params: ResponseParams) -> Result<Self, ResponseError> {
         params.check(mesh.bodies.len())?;
         Ok(Self {
-            params,
-            rest_x: Vec::new(),
             buffers: MotionBuffers::with_capacity(mesh.vertex_count),
-            contacts: ContactSet::default(),
-            frames: Frames::default(),
-            zones: Zones::default(),
-            hits: Vec::new(),
-            shared: HashSet::new(),
+            contacts: if params.friction.is_coulomb() {
+                Contacts::Coulomb(ContactSet::new(Coulomb::new(params.friction.laws())))
+            } else {
+                Contacts::General(ContactSet::new(General::new(params.friction.laws())))
+            },
+            params,
+            stages: Stages::new(mesh),
         })
     }
 
     /// Declares the undeformed positions \[m\] of all vertices, one per vertex.
     ///
     /// Two points of one body then rest at no more than half of the distance that they have undeformed (instead of
-    /// at the thickness), so that a mesh finer than the thickness is not blown up by its own neighbours.
+    /// at the thickness), so that a mesh finer than the thickness is not blown up by its own neighbours. Viscous friction
+    /// takes the areas of contact from them, else from where the first step starts.
     ///
     /// # Errors
     /// [`ResponseError::Length`], [`ResponseError::NotFinite`].
     pub fn set_rest(&mut self, mesh: &CollisionMesh, rest_x: &[Vec3]) -> Result<(), ResponseError> {
         check("rest_x", rest_x, mesh.vertex_count)?;
-        self.rest_x = rest_x.to_vec();
+        self.stages.rest_x = rest_x.to_vec();
+        if let Contacts::General(contacts) = &mut self.contacts {
+            contacts.kernel.set_areas(mesh, rest_x);
+        }
+        Ok(())
+    }
+
+    /// Sets the edges whose strain is limited; none: the effect is off.
+    ///
+    /// # Errors
+    /// [`ResponseError::Parameter`] for a limit or a rest length out of range, or an edge with a vertex that `mesh` does not have.
+    pub fn set_strain_limits(
+        &mut self,
+        mesh: &CollisionMesh,
+        edges: Vec<LimitedEdge>,
+    ) -> Result<(), ResponseError> {
+        for edge in &edges {
+            edge.check(mesh.vertex_count)?;
+        }
+        self.stages.limiter = Limiter::new(edges);
         Ok(())
     }
 
     /// Memory of the buffers that are kept from step to step \[B\]: what each vertex needs from the start, and what the
     /// contacts of the steps so far have needed.
     pub fn bytes(&self) -> usize {
-        // A hash set's slots: one byte of control each.
-        let slots = self.shared.capacity() * (size_of::<[u32; 4]>() + 1);
-        bytes_of(&self.rest_x)
-            + self.buffers.bytes()
-            + self.contacts.bytes()
-            + self.frames.bytes()
-            + self.zones.bytes()
-            + bytes_of(&self.hits)
-            + slots
+        let contacts = match &self.contacts {
+            Contacts::Coulomb(contacts) => contacts.bytes(),
+            Contacts::General(contacts) => contacts.bytes(),
+        };
+        self.buffers.bytes() + contacts + self.stages.bytes()
     }
 
     /// Changes `x_t1` and `v` so that the straight motion `x_t0` → `x_t1` has no known collision.
@@ -82,13 +97,15 @@ impl Responder {
     /// - `dt` \[s\] > 0.
     ///
     /// With the average velocity v̄ = (x_t1 − x_t0)/dt the stages are: repulsion and resting contact of near pairs;
-    /// passes of continuous detection and impulses with friction; rigid impact zones; holding back. After the first
+    /// passes of continuous detection and impulses with friction; rigid impact zones; holding back. Strain limits join the
+    /// impulses; if zones or holding back broke one, the passes are run again, a few times at most. After the first
     /// detection over all pairs each further one looks at the pairs with a changed vertex (the others stand
     /// certified). `v` changes by the change of v̄.
     ///
     /// # Errors
     /// [`ResponseError::Unresolved`] if cloth is caught between prescribed motions (retry with a smaller step), or if
-    /// pairs touch at `x_t0` and `allow_initial_contacts` is off; [`ResponseError::Length`],
+    /// pairs touch at `x_t0` and `allow_initial_contacts` is off; [`ResponseError::Strained`] if a strain limit could not
+    /// be kept (retry with a smaller step); [`ResponseError::Length`],
     /// [`ResponseError::NotFinite`], [`ResponseError::Parameter`] for input that is refused. In each case `x_t1` and
     /// `v` are as they were.
     pub fn respond(
@@ -133,122 +150,27 @@ impl Responder {
         v: &mut [Vec3],
         dt: f64,
     ) -> Result<ResponseInfo, ResponseError> {
-        let Self { params, rest_x, buffers, contacts, frames, zones, hits, shared } = self;
-        let (mesh, count) = (detection.mesh, detection.mesh.vertex_count);
-        check_input(count, inv_mass, x_t0, x_t1, v, dt)?;
-        let mut info = ResponseInfo::default();
-        let mut clock = Clock(Instant::now());
-        let motion = &mut Motion::new(buffers, inv_mass, x_t0, x_t1, dt);
-        frames.clear(mesh.bodies.len());
-        contacts.clear();
-        hits.clear();
-
-        // 1. Near pairs at the start: resting contact and repulsion.
-        let near = detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, None, detection.pool)?;
-        info.proximities = near.len();
-        clock.lap(&mut info, "proximity");
-        shared.clear();
-        for stencil in &near {
-            if let Some(contact) = repulsion::contact(stencil, mesh, params, rest_x, motion)
-                && contact.shared_feature().is_none_or(|key| shared.insert(key))
-            {
-                contacts.push(contact);
-            }
-        }
-        relax(contacts, motion, params, &mut info);
-        motion.write_ends();
-        clock.lap(&mut info, "impulses");
-
-        // 2. Collisions during the step, answered by impulses; the first look is at all pairs.
-        let mut exempt = HashSet::new();
-        let mut judge = |hits: &mut Vec<Hit>| {
-            if params.allow_initial_contacts {
-                hits.retain(|hit| {
-                    let out = hit.touches_at_start(x_t0);
-                    if out {
-                        exempt.insert(hit.key());
-                    }
-                    !out
-                });
+        let mesh = detection.mesh;
+        check_input(mesh.vertex_count, inv_mass, x_t0, x_t1, v, dt)?;
+        let motion = &mut Motion::new(&mut self.buffers, inv_mass, x_t0, x_t1, dt);
+        let info = match &mut self.contacts {
+            Contacts::Coulomb(contacts) => self.stages.run(&self.params, contacts, &mut detection, motion)?,
+            Contacts::General(contacts) => {
+                if contacts.kernel.wants_areas() {
+                    contacts.kernel.set_areas(mesh, x_t0);
+                }
+                contacts.kernel.start(dt);
+                self.stages.run(&self.params, contacts, &mut detection, motion)?
             }
         };
-        detection.hits(motion, APPROACH * params.thickness, false, hits)?;
-        motion.clear_changed();
-        info.passes = 1;
-        judge(hits);
-        info.collisions = hits.len();
-        clock.lap(&mut info, "detection");
-        let mut answered: HashSet<(StencilKind, [u32; 2])> = HashSet::new();
-        while !hits.is_empty() && info.passes < params.max_passes {
-            for hit in hits.iter() {
-                answered.insert(hit.key());
-                if let Some(contact) = hit.contact(mesh, params, rest_x, motion) {
-                    contacts.push(contact);
-                }
-            }
-            relax(contacts, motion, params, &mut info);
-            let moved = motion.write_ends();
-            clock.lap(&mut info, "impulses");
-            if moved == 0 {
-                break;
-            }
-            info.passes += 1;
-            look_again(&mut detection, motion, APPROACH * params.thickness, hits)?;
-            judge(hits);
-            // A pair that was pushed apart and only comes near is no collision.
-            hits.retain(|hit| !answered.contains(&hit.key()) || hit.collides(x_t0, &motion.buffers.end));
-            clock.lap(&mut info, "detection");
-        }
-        hits.retain(|hit| hit.collides(x_t0, &motion.buffers.end));
-        info.impulses = contacts.loaded();
-
-        // 3. Rigid impact zones.
-        if !hits.is_empty() && params.max_zone_passes > 0 {
-            move_zones(zones, &mut detection, motion, frames, params, hits, &mut info, &mut judge)?;
-            clock.lap(&mut info, "zones");
-        }
-
-        // 4. What still collides is held back.
-        if !hits.is_empty() {
-            hold_back(&mut detection, motion, frames, params.thickness, hits, &mut info, &mut judge)?;
-            clock.lap(&mut info, "hold");
-        }
-
-        // 5. Every pair has been seen free of collision on the motion that it has now, or is exempt.
-        if !hits.is_empty() {
-            return Err(unresolved(hits));
-        }
-        info.exempt = exempt.len();
-        for i in 0..count {
-            let change = buffers.velocity[i] - buffers.velocity_start[i];
+        for i in 0..mesh.vertex_count {
+            let change = self.buffers.velocity[i] - self.buffers.velocity_start[i];
             if inv_mass[i] > 0.0 && change != Vec3::zeros() {
-                x_t1[i] = buffers.end[i];
+                x_t1[i] = self.buffers.end[i];
                 v[i] += change;
             }
         }
         Ok(info)
-    }
-}
-
-fn relax(
-    contacts: &mut ContactSet,
-    motion: &mut Motion<'_>,
-    params: &ResponseParams,
-    info: &mut ResponseInfo,
-) {
-    let sweeps = contacts.relax(motion, params.velocity_tolerance, params.max_sweeps);
-    info.sweeps += sweeps.sweeps;
-    info.residual = sweeps.residual;
-}
-
-struct Clock(Instant);
-
-impl Clock {
-    /// Books the time since the last lap on a stage.
-    fn lap(&mut self, info: &mut ResponseInfo, stage: &'static str) {
-        let now = Instant::now();
-        info.add_seconds(stage, (now - self.0).as_secs_f64());
-        self.0 = now;
     }
 }
 
@@ -287,7 +209,7 @@ fn check(name: &'static str, values: &[Vec3], count: usize) -> Result<(), Respon
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::FrictionRule;
+    use crate::{FrictionLaw, FrictionRule};
     use cloth_collision::Body;
     use cloth_collision::mesh::{TriMesh, generators::grid};
 
@@ -320,7 +242,7 @@ mod tests {
         let dt = 0.005;
         let mut x_t1: Vec<Vec3> = x_t0.iter().zip(&v_t0).map(|(x, v)| x + v * dt).collect();
         let mut v = v_t0.clone();
-        let friction = FrictionRule { self_friction: friction, ..FrictionRule::default() };
+        let friction = FrictionRule::uniform(FrictionLaw::Coulomb { mu_c: friction });
         let params = ResponseParams { thickness: 0.004, friction, ..ResponseParams::default() };
         let mut responder = Responder::new(&mesh, params).unwrap();
         let mut bvh = Bvh::new(&mesh, &x_t0).unwrap();
@@ -340,7 +262,8 @@ mod tests {
             met.momentum += change;
             met.angular += x_t0[i].cross(&change);
         }
-        for contact in responder.contacts.contacts() {
+        let Contacts::Coulomb(contacts) = &responder.contacts else { panic!("all laws are Coulomb") };
+        for contact in contacts.contacts() {
             let r: Vec3 = (0..4).map(|k| x_t0[contact.vertices[k] as usize] * contact.weights[k]).sum();
             met.moments += r.cross(&contact.impulse);
             met.impulses += contact.impulse.norm();

@@ -11,19 +11,23 @@
 //! where the changes grow the direction is dropped. Source: Silcowitz, Niebe, Erleben 2010, "A nonsmooth nonlinear
 //! conjugate gradient method for interactive contact force problems".
 
-use crate::Vec3;
+use crate::friction::kernel::Kernel;
 use crate::impulse::Contact;
 use crate::motion::{Motion, bytes_of};
+use crate::{ResponseInfo, Vec3};
 
 /// Cap on sweeps as a multiple of `max_sweeps`: sweeps that look at few contacts cost little.
 const CHEAP_SWEEPS: usize = 10;
 /// Looks that a pass may always take (about 1 ms): small scenes settle as far as their tolerance.
 const FREE_LOOKS: usize = 20_000;
 
+/// Cap on the times that settled sweeps go on with other laws of friction (see [`Kernel::settled`]).
+const MAX_ROUNDS: usize = 8;
+
 /// The contacts of one step.
-#[derive(Default)]
-pub(crate) struct ContactSet {
-    contacts: Vec<Contact>,
+pub(crate) struct ContactSet<K: Kernel> {
+    pub(crate) kernel: K,
+    contacts: Vec<Contact<K::State>>,
     /// Vertices and tick of the last look, apart from the rest: this is all that a settled contact costs.
     looks: Vec<([u32; 4], u32)>,
     /// Change of each impulse in this sweep [N s].
@@ -40,30 +44,63 @@ pub(crate) struct SweepInfo {
     pub(crate) residual: f64,
 }
 
-impl ContactSet {
+impl<K: Kernel> ContactSet<K> {
+    pub(crate) fn new(kernel: K) -> Self {
+        Self { kernel, contacts: Vec::new(), looks: Vec::new(), change: Vec::new(), direction: Vec::new() }
+    }
+
     pub(crate) fn clear(&mut self) {
         self.contacts.clear();
         self.looks.clear();
     }
 
-    pub(crate) fn push(&mut self, contact: Contact) {
+    /// Adds a contact; its index.
+    pub(crate) fn push(&mut self, contact: Contact<K::State>) -> u32 {
         self.looks.push((contact.vertices, 0));
         self.contacts.push(contact);
+        (self.contacts.len() - 1) as u32
+    }
+
+    pub(crate) fn contact(&self, index: u32) -> &Contact<K::State> {
+        &self.contacts[index as usize]
+    }
+
+    /// Changes a contact's least normal velocity [m/s].
+    pub(crate) fn set_least(&mut self, index: u32, least: f64) {
+        self.contacts[index as usize].law.least = least;
+        self.looks[index as usize].1 = 0;
     }
 
     /// Memory [B].
     pub(crate) fn bytes(&self) -> usize {
-        bytes_of(&self.contacts) + bytes_of(&self.looks) + bytes_of(&self.change) + bytes_of(&self.direction)
+        bytes_of(&self.contacts)
+            + bytes_of(&self.looks)
+            + bytes_of(&self.change)
+            + bytes_of(&self.direction)
+            + self.kernel.bytes()
     }
 
     #[cfg(test)]
-    pub(crate) fn contacts(&self) -> &[Contact] {
+    pub(crate) fn contacts(&self) -> &[Contact<K::State>] {
         &self.contacts
     }
 
-    /// Contacts that carry an impulse.
-    pub(crate) fn loaded(&self) -> usize {
-        self.contacts.iter().filter(|c| c.impulse.norm_squared() > 0.0).count()
+    /// Counts the contacts that carry an impulse, and those of them that slide, by more than `tolerance` [m/s], and that
+    /// stick.
+    pub(crate) fn count(&self, motion: &Motion<'_>, tolerance: f64, info: &mut ResponseInfo) {
+        (info.impulses, info.sticking, info.sliding) = (0, 0, 0);
+        for contact in self.contacts.iter().filter(|c| c.impulse.norm_squared() > 0.0) {
+            info.impulses += 1;
+            if self.kernel.acts(&contact.friction) {
+                let u = contact.relative(&motion.buffers.velocity);
+                let v_n = contact.normal.dot(&u);
+                if u.norm_squared() - v_n * v_n > tolerance * tolerance {
+                    info.sliding += 1;
+                } else {
+                    info.sticking += 1;
+                }
+            }
+        }
     }
 
     /// Relaxes the contacts until no relative velocity is off by more than `tolerance` [m/s].
@@ -82,7 +119,10 @@ impl ContactSet {
         if count == 0 {
             return info;
         }
+        self.kernel.begin(&mut self.contacts, motion.x_t0.len());
+        let mut rounds = 0;
         loop {
+            self.kernel.before_sweep(info.sweeps);
             let mut sweep = Sweep { looks: 0, residual: 0.0, norm: 0.0 };
             if info.sweeps % 2 == 0 {
                 (0..count).for_each(|i| self.relax_one(i, motion, tolerance, &mut sweep));
@@ -92,8 +132,17 @@ impl ContactSet {
             info.sweeps += 1;
             info.residual = sweep.residual;
             budget = budget.saturating_sub(sweep.looks);
-            if sweep.residual <= tolerance || budget == 0 || info.sweeps >= CHEAP_SWEEPS * max_sweeps {
-                break;
+            let spent = budget == 0 || info.sweeps >= CHEAP_SWEEPS * max_sweeps;
+            if sweep.residual <= tolerance || spent {
+                rounds += 1;
+                if !self.settled(motion, tolerance) || rounds > MAX_ROUNDS || (spent && rounds > 1) {
+                    break;
+                }
+                // What has let go needs looks of its own.
+                budget = budget.max(count);
+                self.follow(None, motion, tolerance);
+                last_norm = 0.0;
+                continue;
             }
             // A restart forgets the direction, and the change that ended it with it.
             let beta = if last_norm > 0.0 { sweep.norm / last_norm } else { 0.0 };
@@ -103,18 +152,32 @@ impl ContactSet {
         info
     }
 
+    /// Lets friction see where the sweeps have settled; whether a contact has to be looked at again.
+    #[inline(never)]
+    fn settled(&mut self, motion: &Motion<'_>, tolerance: f64) -> bool {
+        let Self { kernel, contacts, looks, .. } = self;
+        let mut changed = false;
+        kernel.settled(contacts, motion, tolerance, |i| {
+            looks[i].1 = 0;
+            changed = true;
+        });
+        changed
+    }
+
     /// Moves the impulses by `beta` times the direction and renews it.
     fn follow(&mut self, beta: Option<f64>, motion: &mut Motion<'_>, tolerance: f64) {
         let Some(beta) = beta else {
-            self.direction.fill(Vec3::zeros());
-            self.change.fill(Vec3::zeros());
+            for (direction, change) in self.direction.iter_mut().zip(&mut self.change) {
+                (*direction, *change) = (Vec3::zeros(), Vec3::zeros());
+            }
             return;
         };
         for i in 0..self.contacts.len() {
             let step = self.direction[i] * beta;
             self.direction[i] = step + std::mem::take(&mut self.change[i]);
-            if step.norm() > tolerance * self.contacts[i].mass {
-                self.move_impulse(i, step, motion);
+            let contact = &mut self.contacts[i];
+            if step.norm() > tolerance * contact.mass {
+                move_impulse(contact, step, motion);
                 // Its own law is off now.
                 self.looks[i].1 = 0;
             }
@@ -127,27 +190,24 @@ impl ContactSet {
         if seen > 0 && latest <= Some(seen) {
             return;
         }
-        let (change, error) = self.contacts[i].correction(&motion.buffers.velocity);
+        let contact = &mut self.contacts[i];
+        let (change, error) = contact.correction(&self.kernel, &motion.buffers.velocity);
         sweep.looks += 1;
         sweep.residual = sweep.residual.max(error);
         if error > tolerance {
-            sweep.norm += error * error * self.contacts[i].mass;
+            sweep.norm += error * error * contact.mass;
             self.change[i] = change;
-            self.move_impulse(i, change, motion);
+            move_impulse(contact, change, motion);
         }
         self.looks[i].1 = motion.tick();
     }
+}
 
-    fn move_impulse(&mut self, i: usize, change: Vec3, motion: &mut Motion<'_>) {
-        let tick = motion.tick();
-        let contact = &mut self.contacts[i];
-        contact.apply(change, &mut motion.buffers.velocity);
-        for k in 0..4 {
-            if contact.moves(k) {
-                motion.buffers.touched[contact.vertices[k] as usize] = tick;
-            }
-        }
-    }
+#[inline]
+fn move_impulse<S: Copy>(contact: &mut Contact<S>, change: Vec3, motion: &mut Motion<'_>) {
+    let tick = motion.tick();
+    let touched = &mut motion.buffers.touched;
+    contact.apply(change, &mut motion.buffers.velocity, |v| touched[v] = tick);
 }
 
 /// What one sweep met.

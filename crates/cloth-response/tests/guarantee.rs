@@ -6,7 +6,9 @@ mod support;
 
 use cloth_response::collision::mesh::generators::{cuboid, grid, sphere};
 use cloth_response::collision::{Contacts, DetectError, Detector, Query};
-use cloth_response::{FrictionRule, ResponseError, ResponseInfo, ResponseParams, Vec3, collision};
+use cloth_response::{
+    FrictionLaw, FrictionRule, ResponseError, ResponseInfo, ResponseParams, Vec3, collision,
+};
 use nalgebra::Rotation3;
 use support::{Part, Random, World, cloth, collider, judge, placed};
 
@@ -274,7 +276,7 @@ fn turning_box_carries_cloth() {
 #[test]
 fn turntable_drags_by_friction() {
     let spin = |friction: f64| {
-        let friction = FrictionRule { bodies: vec![0.0, friction], ..FrictionRule::default() };
+        let friction = FrictionRule::uniform(FrictionLaw::Coulomb { mu_c: friction });
         let card = placed(grid(0.1, 0.1, 5, 5).unwrap(), [0.0; 3], [0.0, 0.004, 0.0]);
         let table = placed(grid(0.3, 0.3, 4, 4).unwrap(), [0.0; 3], [0.011, 0.0, 0.013]);
         let mut world = World::new(&[cloth(card), collider(table)], ResponseParams { friction, ..params() });

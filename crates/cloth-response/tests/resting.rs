@@ -6,7 +6,7 @@ mod support;
 
 use cloth_response::collision::StencilKind;
 use cloth_response::collision::mesh::generators::grid;
-use cloth_response::{FrictionRule, ResponseParams, Vec3};
+use cloth_response::{FrictionLaw, FrictionRule, ResponseParams, Vec3};
 use support::{World, cloth, collider, placed};
 
 /// [m]
@@ -26,7 +26,10 @@ const SLIDE_ERROR: f64 = 5e-3;
 fn params(friction: f64) -> ResponseParams {
     ResponseParams {
         thickness: THICKNESS,
-        friction: FrictionRule { default: friction, ..FrictionRule::default() },
+        friction: FrictionRule::by_kind(
+            FrictionLaw::Coulomb { mu_c: 0.2 },
+            FrictionLaw::Coulomb { mu_c: friction },
+        ),
         ..ResponseParams::default()
     }
 }

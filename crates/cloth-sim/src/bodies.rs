@@ -7,6 +7,7 @@ use crate::{Assets, Scene, SceneError, Vec3};
 use cloth_collision::{DetectError, shapes};
 use cloth_core::mesh::{MeshError, RestShape, Topology, TriMesh, generators};
 use cloth_core::{InPlane, Material};
+use cloth_response::LimitedEdge;
 use std::ops::Range;
 
 /// What a body is.
@@ -55,6 +56,19 @@ pub(crate) struct ColliderBody {
 }
 
 impl ClothBody {
+    /// Rest length of each edge \[m\], of the topology's order; the mean of its triangles' sides where UV panels differ.
+    fn edge_lengths(&self) -> Vec<f64> {
+        let mut sums = vec![(0.0, 0.0); self.topology.edges.len()];
+        for (edges, sides) in self.topology.triangle_edges.iter().zip(&self.rest.side_lengths) {
+            for (&edge, side) in edges.iter().zip(sides) {
+                let (sum, count) = &mut sums[edge as usize];
+                *sum += side;
+                *count += 1.0;
+            }
+        }
+        sums.into_iter().map(|(sum, count)| sum / count).collect()
+    }
+
     /// Half of the cloth's sides are at most so long at rest [m].
     pub(crate) fn median_edge(&self) -> f64 {
         let mut lengths: Vec<f64> = self.rest.side_lengths.iter().flatten().copied().collect();
@@ -90,6 +104,24 @@ impl Bodies {
             colliders.push(body);
         }
         Ok(Self { cloth, colliders, cloth_vertices, vertices: next })
+    }
+
+    /// The edges whose strain the scene limits, but for those between two of the `pinned` vertices (sorted), whose length
+    /// is prescribed.
+    pub(crate) fn limited_edges(&self, scene: &Scene, pinned: &[u32]) -> Vec<LimitedEdge> {
+        let is_pinned = |v: u32| pinned.binary_search(&v).is_ok();
+        let mut limited = Vec::new();
+        for (body, source) in self.cloth.iter().zip(&scene.cloth) {
+            let Some(limit) = source.strain_limit.map(|l| l.limit()) else { continue };
+            let lengths = body.edge_lengths();
+            for (edge, rest_length) in body.topology.edges.iter().zip(lengths) {
+                let vertices = edge.map(|v| v + body.first_vertex as u32);
+                if !vertices.iter().all(|&v| is_pinned(v)) {
+                    limited.push(LimitedEdge { vertices, rest_length, limit });
+                }
+            }
+        }
+        limited
     }
 
     pub(crate) fn infos(&self, scene: &Scene) -> Vec<BodyInfo> {

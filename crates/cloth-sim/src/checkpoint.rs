@@ -3,6 +3,7 @@
 //! Layout, little-endian: magic, version (u32), length of the payload (u64), payload, FNV-1a checksum of the payload (u64).
 //! Payload: scene (JSON), options, state, what bending laws remember, pending steps, assets, report (JSON).
 
+use crate::constraints::Holds;
 use crate::simulation::Pending;
 use crate::step::State;
 use crate::{Assets, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
@@ -10,7 +11,7 @@ use cloth_core::mesh::TriMesh;
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
@@ -33,6 +34,9 @@ impl Simulation {
         payload.points(&self.state.x);
         payload.points(&self.state.v);
         payload.points(&self.state.contact_force);
+        payload.points(&self.state.holds.force);
+        payload
+            .numbers(&self.state.holds.sliding.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<_>>());
         payload.numbers(&self.memory());
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
         payload.u64(pending.steps);
@@ -72,6 +76,13 @@ impl Simulation {
         if x.len() != v.len() {
             return Err(invalid("as many velocities as positions", format!("{} and {}", v.len(), x.len())));
         }
+        let (force, sliding) = (payload.points()?, payload.numbers()?);
+        if !(force.is_empty() || force.len() <= x.len()) || sliding.len() != force.len() {
+            let got = format!("{} and {}", force.len(), sliding.len());
+            return Err(invalid("as many forces of constraints as cloth vertices, each with its state", got));
+        }
+        let sliding = sliding.into_iter().map(|s| s != 0.0).collect();
+        let holds = Holds { force, sliding };
         let memory = payload.numbers()?;
         let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
         let assets = payload.assets()?;
@@ -79,7 +90,8 @@ impl Simulation {
         if !payload.0.is_empty() {
             return Err(invalid("the end of the payload", format!("{} more bytes", payload.0.len())));
         }
-        let mut sim = Self::build(&scene, assets, options, Some(State { time, step, x, v, contact_force }))?;
+        let mut sim =
+            Self::build(&scene, assets, options, Some(State { time, step, x, v, contact_force, holds }))?;
         sim.integrator
             .set_memory(&memory)
             .map_err(|e| invalid("what this scene's laws remember", e.to_string()))?;

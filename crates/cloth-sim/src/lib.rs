@@ -13,11 +13,14 @@ pub use cloth_collision as collision;
 pub use cloth_core as core;
 pub use cloth_response as response;
 
+pub mod friction;
 pub mod scene;
 
 mod assets;
 mod bodies;
 mod checkpoint;
+mod constraints;
+mod contact;
 mod error;
 mod guard;
 mod motion;

@@ -1,10 +1,14 @@
 //! Which effects a scene runs, which it does not, and why: known before the first step.
 
 use crate::bodies::Bodies;
+use crate::contact::ContactStage;
+use crate::friction::LawName;
 use crate::pins::PinSet;
-use crate::step::{ContactStage, State};
+use crate::scene::{Contact, ContactMethod};
+use crate::step::State;
 use crate::{Scene, SceneError};
 use cloth_core::{CoreError, Integrator};
+use cloth_response::FrictionLaw;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -163,6 +167,15 @@ pub(crate) fn build(
             effects.off(name, why);
         }
     }
+    let coupling = integrator.system().hinge_coupling();
+    if coupling.elements > 0 {
+        effects.on(coupling.name, "bending.hinges = \"coupled\"", coupling.elements, coupling.bytes);
+    } else {
+        effects.off(
+            coupling.name,
+            "no material has bending.hinges = \"coupled\" and hinges that share a triangle",
+        );
+    }
     let method = scene.time.integrator;
     effects.on(
         "integrator",
@@ -182,6 +195,7 @@ pub(crate) fn build(
         );
     }
     plan_contact(&mut effects, scene, bodies, contact);
+    plan_strain(&mut effects, scene, contact);
     effects.on("guard", "always", bodies.cloth_vertices, 0);
 
     let mut warnings = Vec::new();
@@ -224,9 +238,13 @@ pub(crate) fn build(
 
 fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Option<&ContactStage>) {
     let (Some(stage), Some(contact)) = (stage, &scene.contact) else {
-        for name in ["contact", "self-contact", "collider contact", "friction", "intersection count"] {
+        for name in ["contact", "contact constraints", "self-contact", "collider contact", "friction"] {
             effects.off(name, "the scene has no [contact]");
         }
+        for law in LawName::ALL {
+            effects.off(&law_effect(law), "the scene has no [contact]");
+        }
+        effects.off("intersection count", "the scene has no [contact]");
         return;
     };
     let mesh = &stage.mesh;
@@ -236,6 +254,16 @@ fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Op
         mesh.triangles.len(),
         stage.bytes(),
     );
+    match contact.method {
+        ContactMethod::VelocityFilter => {
+            effects.off("contact constraints", "contact.method = \"velocity-filter\"");
+        }
+        ContactMethod::Constraints => {
+            let why =
+                "contact.method = \"constraints\": cloth vertices on colliders (its memory is contact's)";
+            effects.on("contact constraints", why, bodies.cloth_vertices, 0);
+        }
+    }
     let selves = bodies.cloth.iter().zip(&mesh.bodies).filter(|(_, rule)| rule.self_collision);
     let self_triangles: usize = selves.map(|(c, _)| c.mesh.triangles.len()).sum();
     if self_triangles > 0 {
@@ -249,17 +277,80 @@ fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Op
     } else {
         effects.off("collider contact", "the scene has no collider");
     }
-    let on_cloth = contact.self_friction > 0.0 && (self_triangles > 0 || bodies.cloth.len() > 1);
-    let on_colliders = scene.collider.iter().any(|c| c.friction.unwrap_or(contact.friction) > 0.0);
-    if on_cloth || on_colliders {
-        effects.on("friction", "a coefficient of friction above zero", mesh.bodies.len(), 0);
-    } else {
-        effects.off("friction", "every coefficient of friction is zero");
-    }
+    plan_friction(effects, scene, contact, stage);
     if stage.allow {
         effects.on("intersection count", "intersections are allowed", mesh.triangles.len(), 0);
     } else {
         effects.off("intersection count", "intersections are not allowed, so there are none");
+    }
+}
+
+/// Name of the effect of a friction law.
+fn law_effect(law: LawName) -> String {
+    format!("friction {}", law.name())
+}
+
+/// One effect per friction law, with the number of pairs of bodies that have it, and one for all of them.
+fn plan_friction(effects: &mut Effects, scene: &Scene, contact: &Contact, stage: &ContactStage) {
+    /// Keys that are named.
+    const NAMED: usize = 4;
+    let (cloths, bodies) = (scene.cloth.len(), stage.mesh.bodies.len());
+    let meeting = (0..cloths)
+        .flat_map(|a| (a..bodies).map(move |b| (a, b)))
+        .filter(|&(a, b)| a != b || stage.mesh.bodies[a].self_collision);
+    // Of each law: pairs, and the keys that ask for it with the kind of pair.
+    let mut found = LawName::ALL.map(|law| (law, 0, Vec::<String>::new()));
+    for (a, b) in meeting {
+        let law = scene.friction_law(contact, a, b);
+        let viscous = matches!(law, FrictionLaw::Viscous { f_v, .. } if f_v > 0.0);
+        if !(law.static_coefficient() > 0.0 || viscous) {
+            continue;
+        }
+        let kind = match (a == b, b < cloths) {
+            (true, _) => "self-contact",
+            (_, true) => "cloth on cloth",
+            _ => "colliders",
+        };
+        let Some((_, pairs, keys)) = found.iter_mut().find(|(name, ..)| name.name() == law.name()) else {
+            continue;
+        };
+        *pairs += 1;
+        let key = format!("{kind}: {}", scene.friction_entry(contact, a, b).0);
+        if !keys.contains(&key) {
+            keys.push(key);
+        }
+    }
+    let pairs = found.iter().map(|(_, pairs, _)| pairs).sum();
+    if pairs > 0 {
+        let table = size_of::<u16>() * bodies * bodies;
+        effects.on("friction", "a coefficient of friction above zero", pairs, table);
+    } else {
+        effects.off("friction", "every coefficient of friction is zero");
+    }
+    for (law, pairs, keys) in found {
+        if pairs == 0 {
+            effects
+                .off(&law_effect(law), format!("no pair of bodies that meet has law = \"{}\"", law.name()));
+            continue;
+        }
+        let more =
+            if keys.len() > NAMED { format!(" and {} more", keys.len() - NAMED) } else { String::new() };
+        let why = keys[..keys.len().min(NAMED)].join(", ") + &more;
+        effects.on(&law_effect(law), why, pairs, 0);
+    }
+}
+
+/// The effect of limited edges.
+fn plan_strain(effects: &mut Effects, scene: &Scene, stage: Option<&ContactStage>) {
+    match stage.filter(|stage| stage.limited_edges > 0) {
+        None => effects.off("strain limit", "no cloth has a strain_limit"),
+        Some(stage) if scene.contact.is_some() => {
+            let why = "cloth with strain_limit (its memory is contact's)";
+            effects.on("strain limit", why, stage.limited_edges, 0);
+        }
+        Some(stage) => {
+            effects.on("strain limit", "cloth with strain_limit", stage.limited_edges, stage.bytes());
+        }
     }
 }
 

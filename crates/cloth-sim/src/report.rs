@@ -72,6 +72,27 @@ pub struct ContactReport {
     pub held_vertices: usize,
     /// Pairs exempt because they touch already at the start.
     pub exempt: usize,
+    /// Contacts that carry an impulse and stick.
+    pub sticking: usize,
+    /// Contacts that carry an impulse and slide.
+    pub sliding: usize,
+    /// Edges that the strain limit pulled or pushed.
+    pub limited_edges: usize,
+    /// Times that the strain limit was linearised anew.
+    pub strain_passes: usize,
+    /// Largest stretch l/l₀ − 1 of a limited edge after the step [-].
+    pub largest_stretch: f64,
+    /// Largest compression 1 − l/l₀ of an edge whose compression is limited, after the step [-].
+    pub largest_compression: f64,
+    /// Cloth vertices that constraints held on colliders so that they stuck.
+    #[serde(default)]
+    pub constrained_sticking: usize,
+    /// Cloth vertices that constraints held on colliders and that slid.
+    #[serde(default)]
+    pub constrained_sliding: usize,
+    /// Solves of the search for which stick and which slide.
+    #[serde(default)]
+    pub constraint_solves: usize,
 }
 
 impl ContactReport {
@@ -86,6 +107,24 @@ impl ContactReport {
         self.zone_vertices += info.zone_vertices;
         self.held_vertices += info.held_vertices;
         self.exempt = self.exempt.max(info.exempt);
+        self.sticking += info.sticking;
+        self.sliding += info.sliding;
+        self.limited_edges += info.limited_edges;
+        self.strain_passes += info.strain_passes;
+        self.largest_stretch = self.largest_stretch.max(info.largest_stretch);
+        self.largest_compression = self.largest_compression.max(info.largest_compression);
+    }
+
+    /// Adds what constraints did to vertices in the solves of one step.
+    pub(crate) fn add_constraints(&mut self, holds: &crate::constraints::Holds, solves: usize) {
+        for (force, sliding) in holds.force.iter().zip(&holds.sliding) {
+            if *sliding {
+                self.constrained_sliding += 1;
+            } else if *force != crate::Vec3::zeros() {
+                self.constrained_sticking += 1;
+            }
+        }
+        self.constraint_solves += solves;
     }
 }
 
@@ -137,8 +176,11 @@ pub struct EffectCost {
 /// The effect whose stages hold the time of the force models.
 const FORCES_WITHIN: &str = "integrator";
 
+/// Strain limits: in a scene without contact all that response takes is for them.
+const STRAIN: &str = "strain limit";
+
 /// The effect that a stage of the step is counted under: an effect of the stage's own name, or one of these.
-const STAGES: [(&str, &str); 11] = [
+const STAGES: [(&str, &str); 12] = [
     ("bending sub-steps", FORCES_WITHIN),
     ("forces", FORCES_WITHIN),
     ("linearise", FORCES_WITHIN),
@@ -150,6 +192,7 @@ const STAGES: [(&str, &str); 11] = [
     ("detection", "contact"),
     ("zones", "contact"),
     ("hold", "contact"),
+    ("strain", STRAIN),
 ];
 
 impl Report {
@@ -191,8 +234,10 @@ impl Report {
         for (name, seconds) in &step.seconds {
             add_seconds(&mut t.seconds, name, *seconds);
         }
+        let alone = !self.effects.iter().any(|e| e.name == "contact");
         for (stage, seconds) in &step.seconds {
             let name = STAGES.iter().find(|(known, _)| known == stage).map_or(stage.as_str(), |s| s.1);
+            let name = if alone && name == "contact" { STRAIN } else { name };
             add_milliseconds(&mut self.effects, name, 1e3 * seconds);
         }
         for (name, seconds) in &step.forces {

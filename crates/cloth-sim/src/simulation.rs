@@ -1,9 +1,11 @@
 //! The engine as one object: built from a scene, stepped, asked.
 
 use crate::bodies::Bodies;
+use crate::contact::ContactStage;
 use crate::guard::Guard;
 use crate::pins::PinSet;
-use crate::step::{ContactStage, State};
+use crate::scene::Contact;
+use crate::step::State;
 use crate::{Assets, BodyInfo, EffectCost, Plan, Report, Scene, SimError, Vec3, plan};
 use cloth_core::{ClothPart, ClothSystem, Energy, Environment, Integrator, IntegratorParams};
 use std::ops::ControlFlow;
@@ -119,6 +121,11 @@ impl Simulation {
         let allow = options.allow_intersections;
         let contact = match &scene.contact {
             Some(contact) => Some(ContactStage::new(scene, contact, allow, &bodies, &pins, &state.x)?),
+            // Strain limits are met by the response, also where there is no contact.
+            None if scene.cloth.iter().any(|c| c.strain_limit.is_some()) => {
+                let contact = Contact::default();
+                Some(ContactStage::new(scene, &contact, allow, &bodies, &pins, &state.x)?)
+            }
             None => None,
         };
         let plan = plan::build(scene, &bodies, &integrator, contact.as_ref(), &pins, &state);
@@ -268,6 +275,18 @@ impl Simulation {
     /// What bending laws remember of the path so far.
     pub(crate) fn memory(&self) -> Vec<f64> {
         self.integrator.system().memory(&self.state.x)
+    }
+
+    /// Force of contact on each cloth vertex in the last step [N]: of constraints and of impulses, divided by the step; zero
+    /// before the first step, and in a scene without contact.
+    pub fn contact_forces(&self) -> Vec<Vec3> {
+        let mut forces = vec![Vec3::zeros(); self.bodies.cloth_vertices];
+        for list in [&self.state.contact_force, &self.state.holds.force] {
+            for (sum, force) in forces.iter_mut().zip(list) {
+                *sum += force;
+            }
+        }
+        forces
     }
 
     /// Which effects run and why.

@@ -4,14 +4,14 @@
 //! as it was and is retried with half the size, down to `time.max_halvings` halvings; then the run stops.
 
 use crate::bodies::Bodies;
+use crate::constraints::{Holds, failure};
+use crate::contact::{ContactStage, stage};
 use crate::guard::Alarm;
 use crate::pins::PinSet;
 use crate::report::add_seconds;
-use crate::scene::Contact;
-use crate::{Scene, SimError, Simulation, StepReport, Vec3};
-use cloth_collision::{Body, Bvh, CollisionMesh, Detector, detector, intersections};
-use cloth_core::{Pins, StepError, StepInfo};
-use cloth_response::{FrictionRule, Responder, ResponseError, ResponseInfo, ResponseParams};
+use crate::{SimError, Simulation, StepReport, Vec3};
+use cloth_core::{Pins, StepInfo};
+use cloth_response::{ResponseError, ResponseInfo};
 use std::time::Instant;
 
 /// The state that a checkpoint holds.
@@ -23,6 +23,8 @@ pub(crate) struct State {
     pub(crate) v: Vec<Vec3>,
     /// What contact did to each vertex in the last step \[N\]; empty in a scene without contact.
     pub(crate) contact_force: Vec<Vec3>,
+    /// What contact constraints did in the last step; empty in a scene without.
+    pub(crate) holds: Holds,
 }
 
 impl State {
@@ -40,7 +42,7 @@ impl State {
             let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
             body.motion.write(0.0, &mut x[range]);
         }
-        Self { time: 0.0, step: 0, x, v, contact_force: Vec::new() }
+        Self { time: 0.0, step: 0, x, v, contact_force: Vec::new(), holds: Holds::default() }
     }
 
     /// Moves pinned vertices to where their motion starts, at rest.
@@ -54,99 +56,8 @@ impl State {
     }
 }
 
-/// What a scene with contact has and one without does not.
-pub(crate) struct ContactStage {
-    pub(crate) mesh: CollisionMesh,
-    bvh: Bvh,
-    /// Another method than the hierarchy for continuous detection.
-    continuous: Option<Box<dyn Detector>>,
-    responder: Responder,
-    /// Whether known intersections are allowed.
-    pub(crate) allow: bool,
-}
-
-impl ContactStage {
-    pub(crate) fn new(
-        scene: &Scene,
-        contact: &Contact,
-        allow: bool,
-        bodies: &Bodies,
-        pins: &PinSet,
-        x: &[Vec3],
-    ) -> Result<Self, SimError> {
-        let allow = allow || contact.allow_intersections;
-        let cloth = bodies.cloth.iter().zip(&scene.cloth).map(|(body, source)| {
-            let self_collision = contact.self_collision && source.self_collision;
-            (Body { dynamic: true, self_collision }, body.x.len(), &body.mesh.triangles[..])
-        });
-        let colliders = bodies.colliders.iter().map(|body| {
-            let rule = Body { dynamic: false, self_collision: false };
-            (rule, body.motion.vertex_count(), &body.triangles[..])
-        });
-        let list: Vec<_> = cloth.chain(colliders).collect();
-        let mut mesh = CollisionMesh::new(&list).map_err(|e| stage("collision mesh", &e))?;
-        for &(vertex, collider) in &pins.attachments {
-            mesh.set_attachment(vertex, (bodies.cloth.len() + collider) as u32);
-        }
-        let bvh = Bvh::new(&mesh, x).map_err(|e| stage("collision mesh", &e))?;
-        let continuous = if contact.detector == bvh.name() {
-            None
-        } else {
-            Some(detector(&contact.detector, &mesh, x).map_err(|e| stage("detector", &e))?)
-        };
-        let own = scene.collider.iter().map(|c| c.friction.unwrap_or(contact.friction));
-        let params = ResponseParams {
-            thickness: contact.thickness,
-            repulsion_stiffness: contact.repulsion_stiffness,
-            friction: FrictionRule {
-                self_friction: contact.self_friction,
-                bodies: vec![contact.self_friction; bodies.cloth.len()].into_iter().chain(own).collect(),
-                default: contact.friction,
-            },
-            max_passes: contact.max_passes,
-            max_zone_passes: contact.max_zone_passes,
-            allow_initial_contacts: allow,
-            ..ResponseParams::default()
-        };
-        let mut responder = Responder::new(&mesh, params).map_err(|e| stage("contact", &e))?;
-        let mut rest_x = x.to_vec();
-        for body in &bodies.cloth {
-            rest_x[body.first_vertex..body.first_vertex + body.x.len()].copy_from_slice(&body.mesh.vertices);
-        }
-        responder.set_rest(&mesh, &rest_x).map_err(|e| stage("contact", &e))?;
-        Ok(Self { mesh, bvh, continuous, responder, allow })
-    }
-
-    pub(crate) fn intersections(
-        &self,
-        x: &[Vec3],
-        pool: &rayon::ThreadPool,
-    ) -> Result<Vec<[u32; 2]>, SimError> {
-        intersections(&self.mesh, x, pool).map_err(|e| stage("intersections", &e))
-    }
-
-    /// Memory of the collision topology, of the detection's tree and boxes, and of the response's buffers, which grow with
-    /// the contacts [B].
-    pub(crate) fn bytes(&self) -> usize {
-        let mesh = &self.mesh;
-        size_of_val(&mesh.triangles[..])
-            + size_of_val(&mesh.edges[..])
-            + size_of_val(&mesh.triangle_edges[..])
-            + size_of_val(&mesh.vertex_body[..])
-            + size_of_val(&mesh.attached_to[..])
-            + size_of_val(&mesh.vertex_owner[..])
-            + size_of_val(&mesh.edge_owner[..])
-            + self.bvh.bytes()
-            + self.responder.bytes()
-    }
-}
-
-fn stage(stage: &'static str, error: &dyn std::error::Error) -> SimError {
-    SimError::Stage { stage, message: error.to_string() }
-}
-
 /// Why an attempt at a step was given up; the state is as before it.
-enum Failure {
+pub(crate) enum Failure {
     Alarm(Alarm),
     Unresolved {
         pairs: Vec<[u32; 4]>,
@@ -211,14 +122,14 @@ impl Simulation {
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
         let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
-        self.expect_contact(dt, &mut v);
-        let dynamics = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
-        self.forget_contact(dt, &mut x, &mut v);
+        let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let v_free = self.contact.is_some().then(|| v.clone());
         if let Some(info) = self.response(dt, &mut x, &mut v, report)? {
             self.check(&x, &v, report)?;
-            report.contact.get_or_insert_default().add(&info);
+            let contact = report.contact.get_or_insert_default();
+            contact.add(&info);
+            contact.add_constraints(&holds, solves);
         }
 
         report.newton_iterations += dynamics.newton_iterations;
@@ -236,6 +147,7 @@ impl Simulation {
             self.state.contact_force = (0..v.len()).map(force).collect();
         }
         self.integrator.accept();
+        self.state.holds = holds;
         self.state.x = x;
         self.state.v = v;
         self.state.time = t1;
@@ -263,7 +175,7 @@ impl Simulation {
         }
     }
 
-    /// The end of the step without contact.
+    /// The end of the step without contact but for constraints, what those did, and their solves.
     fn dynamics(
         &mut self,
         dt: f64,
@@ -272,21 +184,24 @@ impl Simulation {
         pin_x: &[Vec3],
         pin_v: &[Vec3],
         report: &mut StepReport,
-    ) -> Result<StepInfo, Failure> {
-        let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
-        let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(|error| match error {
-            StepError::Solver { error, vertices } => {
-                Failure::Alarm(Alarm { reason: error.to_string(), vertices })
-            }
-            other => Failure::Stop(stage("dynamics", &other)),
-        })?;
+    ) -> Result<(StepInfo, Holds, usize), Failure> {
+        let constrained = self.constrained_dynamics(dt, x, v, pin_x, pin_v, report)?;
+        let (info, holds, solves) = if let Some(done) = constrained {
+            done
+        } else {
+            let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
+            self.expect_contact(dt, v);
+            let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?;
+            self.forget_contact(dt, x, v);
+            (info, Holds::default(), 0)
+        };
         for (name, seconds) in &info.seconds {
             add_seconds(&mut report.seconds, name, *seconds);
         }
         for (name, seconds) in &info.forces {
             add_seconds(&mut report.forces, name, *seconds);
         }
-        Ok(info)
+        Ok((info, holds, solves))
     }
 
     /// Makes the motion free of known collisions; `None` for a scene without contact.
@@ -481,6 +396,65 @@ pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = 
         straight.step().unwrap();
         straight.step().unwrap();
         assert_eq!(sim.state, straight.state);
+    }
+
+    /// A card that slides down a slope, held by contact constraints.
+    fn sliding() -> Simulation {
+        let text = r#"
+duration = 1.0
+[time]
+dt = 0.01
+[contact]
+method = "constraints"
+thickness = 0.01
+friction = { law = "coulomb-stiction", mu_c = 0.1, mu_s = 0.2 }
+[[cloth]]
+name = "card"
+mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 6, ny = 6 }
+material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 50.0 } }
+position = [-0.003, 0.01, 0.0]
+rotation = { axis = [0, 0, 1], angle = 0.3 }
+[[collider]]
+name = "slope"
+shape = { type = "plane", half_size = 3.0 }
+rotation = { axis = [0, 0, 1], angle = 0.3 }
+"#;
+        let scene = Scene::parse_toml(text, "test.toml").unwrap();
+        let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+        Simulation::new(&scene, Assets::default(), options).unwrap()
+    }
+
+    #[test]
+    fn a_retry_leaves_no_trace_in_contact_constraints() {
+        let mut retried = sliding();
+        retried.step().unwrap();
+        // An attempt that the guard gives up, after a search of its own.
+        let good = retried.state.clone();
+        retried.state.v[7].x = 1e6;
+        let before = retried.state.clone();
+        assert!(retried.attempt(0.02, 0.01, &mut crate::StepReport::default()).is_err());
+        assert_eq!(retried.state, before);
+        retried.state = good;
+        retried.fail = |time, dt| time < 0.015 && dt > 0.006;
+        retried.step().unwrap();
+        let mut straight = sliding();
+        for [end, dt] in [[0.01, 0.01], [0.015, 0.005], [0.02, 0.005]] {
+            straight.step_to(end, dt).unwrap();
+        }
+        let state = |sim: &Simulation| (sim.state.x.clone(), sim.state.v.clone(), sim.state.holds.clone());
+        assert!(state(&retried) == state(&straight));
+        assert!(retried.state.holds.sliding.iter().any(|s| *s));
+        let mut whole = sliding();
+        whole.step().unwrap();
+        whole.step().unwrap();
+        assert!(state(&retried) != state(&whole), "the comparison sees a difference");
+        // What is not a number comes out as an alarm that names vertices, and the state stays.
+        let good = retried.state.clone();
+        retried.fail = |_, _| false;
+        retried.state.v[7].x = f64::NAN;
+        let SimError::Diverged { vertices, .. } = retried.step().unwrap_err() else { panic!("diverged") };
+        assert!(!vertices.is_empty());
+        assert_eq!(retried.state.x, good.x);
     }
 
     #[test]

@@ -91,7 +91,7 @@ fn an_animated_mesh_lifts_cloth() {
 #[test]
 fn impact_zones_ride_on_an_animated_mesh() {
     let (zones, ..) = run(on_walker("max_passes = 1", ""), &[]);
-    assert!(zones > 2, "{zones} zones");
+    assert!(zones > 0, "{zones} zones");
 }
 
 #[test]

@@ -298,7 +298,7 @@ proptest! {
 
 #[test]
 fn a_fabric_takes_the_law_that_the_scene_asks_for() {
-    use cloth_core::Bending;
+    use cloth_core::{Bending, HingeCoupling};
     let scene = |material: &str| {
         Scene::parse_toml(
             &format!(
@@ -319,10 +319,14 @@ fn a_fabric_takes_the_law_that_the_scene_asks_for() {
     assert_eq!((law.plasticity, law.fatigue), (0.2, 0.0));
     assert!(law.coercive_couple.is_some_and(|c| c > 0.0));
     assert!(matches!(of("{ fabric = \"cotton\" }"), Bending::Hinge { .. }));
+    assert_eq!(
+        of("{ fabric = \"cotton\", hinges = \"independent\" }").hinges(),
+        Some(HingeCoupling::Independent)
+    );
     let own =
         "{ areal_density = 0.2, in_plane = { model = \"spring\", stiffness = 9.0 }, bending = BENDING }";
     let linear = of(&own.replace("BENDING", "{ model = \"linear\", rigidity = 1e-5 }"));
-    assert_eq!(linear, Bending::Hinge { rigidity: 1e-5, damping: 0.0 });
+    assert_eq!(linear, Bending::Hinge { rigidity: 1e-5, damping: 0.0, hinges: HingeCoupling::Coupled });
     assert!(matches!(
         of(&own.replace("BENDING", "{ model = \"spring\", stiffness = 1.0 }")),
         Bending::Spring { .. }

@@ -78,10 +78,14 @@ class Loop:
             "plasticity": self.plasticity, "fatigue": self.fatigue,
         }  # fmt: skip
 
-    def law(self, model: str, **extra: float) -> dict[str, Any]:
-        """The ``bending`` table of a material: linear (b2), nonlinear, plastic (b2 up to K0) or hysteresis."""
+    def law(self, model: str, **values: float) -> dict[str, Any]:
+        """The ``bending`` table of a material: linear (b2), nonlinear, plastic (b2 up to K0) or hysteresis.
+
+        Hinges bend each by itself, as in the thesis.
+        """
         si = self.si()
         curve = {key: si[key] for key in ("b1", "b2", "c1")}
+        extra: dict[str, Any] = {"hinges": "independent", **values}
         if model == "linear":
             return {"model": "hinge", "rigidity": si["b2"], **extra}
         if model == "plastic":

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{ELEMENTS_PER_CHUNK, ForceClock, timed};
 use crate::{
-    forces::{Block, CouplingKind, Couplings, ForceModel, Linear, Outer, Psd, corner_pairs},
+    forces::{Block, CouplingKind, Couplings, ForceModel, Linear, Outer, Psd, Survey, corner_pairs},
     mesh::Vec3,
 };
 
@@ -20,6 +20,8 @@ pub(crate) struct ElementBuffers {
 /// Room for the corner forces of every element of every model, and what their evaluation took.
 pub(crate) struct Corners {
     pub(crate) forces: Vec<Vec3>,
+    /// Per model what its elements see of each other.
+    pub(crate) surveys: Vec<Survey<Vec<f64>>>,
     pub(crate) clock: ForceClock,
 }
 
@@ -27,6 +29,14 @@ pub(crate) struct Corners {
 pub(crate) fn part(memory: &[f64], count: usize, range: Range<usize>) -> &[f64] {
     let words = memory.len() / count.max(1);
     &memory[words * range.start..words * range.end]
+}
+
+/// The survey of a model, for the elements of a range.
+pub(crate) fn surveyed(survey: &Survey<Vec<f64>>, range: Range<usize>) -> Survey<&[f64]> {
+    if survey.work.is_empty() {
+        return Survey::default();
+    }
+    Survey { elastic: &survey.elastic, work: &survey.work[range] }
 }
 
 /// The memory of each chunk of a model's `count` elements; empty parts for a law without memory.
@@ -37,10 +47,32 @@ pub(crate) fn parts_mut(memory: &mut [f64], count: usize) -> Vec<&mut [f64]> {
     memory.chunks_mut(memory.len() / count * ELEMENTS_PER_CHUNK).collect()
 }
 
+impl Survey<Vec<f64>> {
+    /// Room for the elements of a model.
+    pub(crate) fn new(model: &dyn ForceModel) -> Self {
+        let count = if model.coupled().is_some() { model.count() } else { 0 };
+        Self { elastic: vec![0.0; count], work: vec![0.0; count] }
+    }
+
+    /// Looks at all elements; nothing for a model whose elements stand alone.
+    pub(crate) fn take(&mut self, model: &dyn ForceModel, memory: &[f64], x: &[Vec3]) {
+        let count = self.work.len();
+        let parts = self.elastic.par_chunks_mut(ELEMENTS_PER_CHUNK);
+        parts.zip(self.work.par_chunks_mut(ELEMENTS_PER_CHUNK)).enumerate().for_each(
+            |(chunk, (elastic, work))| {
+                let start = chunk * ELEMENTS_PER_CHUNK;
+                let range = start..start + work.len();
+                model.survey(range.clone(), x, part(memory, count, range), Survey { elastic, work });
+            },
+        );
+    }
+}
+
 impl Corners {
     pub(crate) fn new(models: &[Box<dyn ForceModel>]) -> Self {
         Self {
             forces: vec![Vec3::zeros(); models.iter().map(|m| m.vertices().len()).sum()],
+            surveys: models.iter().map(|m| Survey::new(&**m)).collect(),
             clock: ForceClock::new(models.len()),
         }
     }
@@ -54,15 +86,19 @@ impl Corners {
         v: &[Vec3],
     ) {
         let mut forces = self.forces.as_mut_slice();
-        for ((model, memory), seconds) in models.iter().zip(memory).zip(&mut self.clock.models) {
+        let clocks = self.surveys.iter_mut().zip(&mut self.clock.models);
+        for ((model, memory), (survey, seconds)) in models.iter().zip(memory).zip(clocks) {
             let corners = model.corners();
             let mine;
             (mine, forces) = std::mem::take(&mut forces).split_at_mut(model.vertices().len());
             timed(seconds, || {
+                survey.take(&**model, memory, x);
+                let survey = &*survey;
                 mine.par_chunks_mut(ELEMENTS_PER_CHUNK * corners).enumerate().for_each(|(chunk, out)| {
                     let start = chunk * ELEMENTS_PER_CHUNK;
                     let range = start..start + out.len() / corners;
-                    model.forces(range.clone(), x, v, part(memory, model.count(), range), out);
+                    let memory = part(memory, model.count(), range.clone());
+                    model.forces(range.clone(), x, v, memory, surveyed(survey, range), out);
                 });
             });
         }
@@ -99,42 +135,54 @@ impl ElementBuffers {
         let mut forces = corners.forces.as_mut_slice();
         let (mut blocks, mut outer, mut diagonal) =
             (self.blocks.as_mut_slice(), self.outer.as_mut_slice(), self.diagonal.as_mut_slice());
-        for ((model, memory), seconds) in models.iter().zip(memory).zip(&mut corners.clock.models) {
+        let clocks = corners.surveys.iter_mut().zip(&mut corners.clock.models);
+        for ((model, memory), (survey, seconds)) in models.iter().zip(memory).zip(clocks) {
             let n = model.corners();
             let f;
             (f, forces) = std::mem::take(&mut forces).split_at_mut(model.vertices().len());
-            let memory = parts_mut(memory, model.count());
-            let f = f.par_chunks_mut(ELEMENTS_PER_CHUNK * n).enumerate().zip(memory);
-            let range = |chunk: usize, f: &[Vec3]| {
-                let start = chunk * ELEMENTS_PER_CHUNK;
-                start..start + f.len() / n
-            };
-            timed(seconds, || match model.coupling(linear.psd) {
+            let kind = model.coupling(linear.psd);
+            let mut parts = Parts { blocks: &mut [], outer: &mut [], diagonal: &mut [] };
+            match kind {
                 CouplingKind::Blocks => {
-                    let per_element = corner_pairs(n).len();
-                    let mine;
-                    (mine, blocks) = std::mem::take(&mut blocks).split_at_mut(model.count() * per_element);
-                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK * per_element)).for_each(
-                        |(((chunk, f), memory), c)| {
-                            model.linearise(range(chunk, f), x, v, linear, memory, f, Couplings::Blocks(c));
-                        },
-                    );
+                    let room = model.count() * corner_pairs(n).len();
+                    (parts.blocks, blocks) = std::mem::take(&mut blocks).split_at_mut(room);
                 }
                 CouplingKind::Outer => {
-                    let mine;
-                    (mine, outer) = std::mem::take(&mut outer).split_at_mut(model.count());
-                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|(((chunk, f), memory), c)| {
-                        model.linearise(range(chunk, f), x, v, linear, memory, f, Couplings::Outer(c));
-                    });
+                    (parts.outer, outer) = std::mem::take(&mut outer).split_at_mut(model.count());
                 }
                 CouplingKind::Diagonal => {
-                    let mine;
-                    (mine, diagonal) = std::mem::take(&mut diagonal).split_at_mut(model.count());
-                    f.zip(mine.par_chunks_mut(ELEMENTS_PER_CHUNK)).for_each(|(((chunk, f), memory), c)| {
-                        model.linearise(range(chunk, f), x, v, linear, memory, f, Couplings::Diagonal(c));
+                    (parts.diagonal, diagonal) = std::mem::take(&mut diagonal).split_at_mut(model.count());
+                }
+            }
+            timed(seconds, || {
+                let count = model.count();
+                let first = parts_mut(memory, count)
+                    .into_par_iter()
+                    .zip(parts_mut(&mut survey.elastic, count))
+                    .zip(parts_mut(&mut survey.work, count));
+                parts.each(kind, f, n, first, |range, f, ((memory, elastic), work), couplings| {
+                    model.linearise(range, x, v, linear, memory, Survey { elastic, work }, f, couplings);
+                });
+                if !survey.work.is_empty() {
+                    let (memory, survey) = (&*memory, &*survey);
+                    parts.each(kind, f, n, chunks(count), |range, f, (), couplings| {
+                        let memory = part(memory, count, range.clone());
+                        let survey = surveyed(survey, range.clone());
+                        model.couple(range, x, v, linear, memory, survey, f, couplings);
                     });
                 }
             });
+        }
+    }
+
+    /// Adds to `out` what the exact stiffness of coupled models makes of the motions `d` beyond what they last wrote, of
+    /// models that write outer products.
+    pub(crate) fn add_beyond(&self, models: &[Box<dyn ForceModel>], d: &[Vec3], out: &mut [Vec3]) {
+        let mut rest = self.outer.as_slice();
+        for model in models.iter().filter(|m| m.coupling(Psd::Projected) == CouplingKind::Outer) {
+            let mine;
+            (mine, rest) = rest.split_at(model.count());
+            model.add_beyond(mine, d, out);
         }
     }
 
@@ -143,5 +191,55 @@ impl ElementBuffers {
         size_of_val(self.blocks.as_slice())
             + size_of_val(self.outer.as_slice())
             + size_of_val(self.diagonal.as_slice())
+    }
+}
+
+/// Nothing for each chunk of `count` elements.
+fn chunks(count: usize) -> impl IndexedParallelIterator<Item = ()> {
+    (0..count.div_ceil(ELEMENTS_PER_CHUNK)).into_par_iter().map(|_| ())
+}
+
+/// Room for the couplings of one model: one of the three is not empty.
+struct Parts<'a> {
+    blocks: &'a mut [Block],
+    outer: &'a mut [Outer],
+    diagonal: &'a mut [f64],
+}
+
+impl Parts<'_> {
+    /// Calls `act(range, forces, own, couplings)` for each chunk of elements, `own` what `with` has for the chunk.
+    fn each<T: Send>(
+        &mut self,
+        kind: CouplingKind,
+        forces: &mut [Vec3],
+        corners: usize,
+        with: impl IndexedParallelIterator<Item = T>,
+        act: impl Fn(Range<usize>, &mut [Vec3], T, Couplings<'_>) + Sync,
+    ) {
+        let elements = forces.par_chunks_mut(ELEMENTS_PER_CHUNK * corners).enumerate().zip(with);
+        let range = |chunk: usize, f: &[Vec3]| {
+            let start = chunk * ELEMENTS_PER_CHUNK;
+            start..start + f.len() / corners
+        };
+        match kind {
+            CouplingKind::Blocks => {
+                let parts = self.blocks.par_chunks_mut(ELEMENTS_PER_CHUNK * corner_pairs(corners).len());
+                elements.zip(parts).for_each(|(((chunk, f), own), c)| {
+                    act(range(chunk, f), f, own, Couplings::Blocks(c));
+                });
+            }
+            CouplingKind::Outer => {
+                let parts = self.outer.par_chunks_mut(ELEMENTS_PER_CHUNK);
+                elements.zip(parts).for_each(|(((chunk, f), own), c)| {
+                    act(range(chunk, f), f, own, Couplings::Outer(c));
+                });
+            }
+            CouplingKind::Diagonal => {
+                let parts = self.diagonal.par_chunks_mut(ELEMENTS_PER_CHUNK);
+                elements.zip(parts).for_each(|(((chunk, f), own), c)| {
+                    act(range(chunk, f), f, own, Couplings::Diagonal(c));
+                });
+            }
+        }
     }
 }

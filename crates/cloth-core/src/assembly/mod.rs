@@ -12,13 +12,15 @@ mod clock;
 mod elements;
 mod gather;
 mod pattern;
+mod projection;
 pub(crate) mod simd;
 
 pub(crate) use block_csr::{BlockMatrix, Lanes};
 pub(crate) use clock::{ForceClock, timed};
-pub(crate) use elements::{Corners, ElementBuffers, part, parts_mut};
+pub(crate) use elements::{Corners, ElementBuffers, part, parts_mut, surveyed};
 pub(crate) use gather::Assembler;
 pub(crate) use pattern::Pattern;
+pub(crate) use projection::{Freedom, Projection};
 
 /// Rows of one unit of parallel work: fixed, so that sums do not depend on the number of threads.
 pub(crate) const ROWS_PER_CHUNK: usize = 256;

@@ -343,6 +343,15 @@ impl BendingLaw for Hysteresis {
         2.0 - self.curve.b2() / self.curve.b1()
     }
 
+    fn elastic_rigidity(&self) -> f64 {
+        self.curve.b2()
+    }
+
+    #[inline(always)]
+    fn elastic(&self, place: &Loop, curvature: f64) -> f64 {
+        curvature - place.rest
+    }
+
     fn last(place: &Loop) -> Option<f64> {
         Some(place.rest + place.curvature)
     }

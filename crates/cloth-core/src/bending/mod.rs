@@ -81,6 +81,14 @@ pub(crate) trait BendingLaw: Send + Sync {
         1.0
     }
 
+    /// B of the elastic part B K_e of the moment [N m].
+    fn elastic_rigidity(&self) -> f64;
+
+    /// K_e: the curvature that the elastic part sees after a monotone motion to `curvature` [1/m].
+    fn elastic(&self, _memory: &Self::Memory, curvature: f64) -> f64 {
+        curvature
+    }
+
     /// The curvature at which `memory` was last advanced [1/m]; none for laws without memory.
     fn last(memory: &Self::Memory) -> Option<f64>;
 }
@@ -134,6 +142,10 @@ impl BendingLaw for Linear {
         Place { rest_curvature: 0.0, b1: self.rigidity, frictional_moment: 0.0 }
     }
 
+    fn elastic_rigidity(&self) -> f64 {
+        self.rigidity
+    }
+
     fn last((): &()) -> Option<f64> {
         None
     }
@@ -159,6 +171,10 @@ impl BendingLaw for Curve {
 
     fn place(&self, (): &()) -> Place {
         Place { rest_curvature: 0.0, b1: self.b1(), frictional_moment: self.m0() }
+    }
+
+    fn elastic_rigidity(&self) -> f64 {
+        self.b2()
     }
 
     fn last((): &()) -> Option<f64> {

@@ -99,6 +99,15 @@ impl BendingLaw for Plastic {
         Place { rest_curvature: place.plastic, b1: self.rigidity, frictional_moment: self.limit_moment() }
     }
 
+    fn elastic_rigidity(&self) -> f64 {
+        self.rigidity
+    }
+
+    #[inline]
+    fn elastic(&self, place: &Flow, curvature: f64) -> f64 {
+        curvature - (place.plastic + self.flow(place, curvature))
+    }
+
     fn last(place: &Flow) -> Option<f64> {
         Some(place.curvature)
     }

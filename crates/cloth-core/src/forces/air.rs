@@ -11,7 +11,7 @@
 
 use std::ops::Range;
 
-use super::{CouplingKind, Couplings, ForceModel, Linear, Psd};
+use super::{CouplingKind, Couplings, ForceModel, Linear, Psd, Survey};
 use crate::{EffectInfo, Energy, mesh::Vec3};
 
 /// Drag and lift on the triangles of all cloth.
@@ -69,9 +69,25 @@ impl ForceModel for Air {
         true
     }
 
-    fn add_energy(&self, _range: Range<usize>, _x: &[Vec3], _memory: &[f64], _energy: &mut Energy) {}
+    fn add_energy(
+        &self,
+        _range: Range<usize>,
+        _x: &[Vec3],
+        _memory: &[f64],
+        _survey: Survey<&[f64]>,
+        _energy: &mut Energy,
+    ) {
+    }
 
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], _memory: &[f64], out: &mut [Vec3]) {
+    fn forces(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        _memory: &[f64],
+        _survey: Survey<&[f64]>,
+        out: &mut [Vec3],
+    ) {
         for (element, f) in range.zip(out.chunks_exact_mut(3)) {
             f.fill(self.corner(element, x, v).0);
         }
@@ -84,6 +100,7 @@ impl ForceModel for Air {
         v: &[Vec3],
         linear: &Linear,
         _memory: &mut [f64],
+        _survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {

@@ -16,6 +16,12 @@
 //!
 //! Damping (3.8): torque |e| D θ̇/h̄ with the law's damping D [N m s].
 //!
+//! Coupled hinges add E_c = Σ C_ij e_i e_j over the pairs of hinges of each triangle ([`Coupled`]), and its torque, with the
+//! elastic angles e = h̄ K_e, K_e what the law's elastic part B K_e sees (K less what a path has made of the rest angle).
+//! Friction and flow stay with each hinge: E_c is the energy of its torque but where the plastic law flows within a step, and a
+//! rest angle that moves takes its part of E_c along. An evaluation takes two passes: the angles of all hinges, then the forces. The
+//! tangent takes E_c by its bound.
+//!
 //! A triangle flatter than 10⁻⁴ of its rest area has its gradient scaled down to zero with its normal, so forces stay
 //! finite; there the force is no longer the exact gradient of E.
 //!
@@ -25,10 +31,14 @@
 
 use std::{f64::consts::PI, ops::Range};
 
-use super::{CouplingKind, Couplings, ForceModel, Psd, corner_pairs};
+use super::{
+    CouplingKind, Couplings, ForceModel, Psd, Survey, corner_pairs,
+    coupled::{Coupled, Plate},
+};
 use crate::{
     CoreError, EffectInfo, Energy,
-    bending::{BendingLaw, HingeState, Moment, words},
+    bending::{BendingLaw, HingeState, words},
+    forces::Outer,
     mesh::Vec3,
 };
 
@@ -45,6 +55,7 @@ pub(crate) struct Hinges<L: BendingLaw> {
     damping: f64,
     vertices: Vec<[u32; 4]>,
     rest: Vec<Rest>,
+    coupled: Option<Coupled>,
 }
 
 /// Rest data of one hinge.
@@ -118,7 +129,13 @@ impl<L: BendingLaw> Hinges<L> {
                 }
             }
         }
-        Ok(Self { law, damping, vertices, rest })
+        Ok(Self { law, damping, vertices, rest, coupled: None })
+    }
+
+    /// The same hinges, coupled over these triangles.
+    pub(crate) fn coupled(mut self, plates: &[Plate]) -> Self {
+        self.coupled = Coupled::new(self.law.elastic_rigidity(), &self.rest, plates);
+        self
     }
 
     /// Change of curvature of a hinge whose angle is `angle` ∈ [−π, π].
@@ -139,6 +156,26 @@ impl<L: BendingLaw> Hinges<L> {
         self.vertices[element].map(|i| x[i as usize])
     }
 
+    /// dθ/dx of the corners.
+    #[inline(always)]
+    fn gradient(rest: &Rest, x: &[Vec3; 4]) -> [Vec3; 4] {
+        let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
+        let (n0, n1) = (e.cross(&l0), l1.cross(&e));
+        let e2 = e.norm_squared();
+        Self::gradient_of(rest, [e, l0, l1, n0, n1], e2, e2.sqrt())
+    }
+
+    #[inline(always)]
+    fn gradient_of(rest: &Rest, [e, l0, l1, n0, n1]: [Vec3; 5], e2: f64, length: f64) -> [Vec3; 4] {
+        let g2 = n0 * (-length / n0.norm_squared().max(rest.floor[0]));
+        let g3 = n1 * (-length / n1.norm_squared().max(rest.floor[1]));
+        let inverse = 1.0 / e2.max(rest.edge * rest.edge * COLLAPSED * COLLAPSED);
+        let (t0, t1) = (l0.dot(&e) * inverse, l1.dot(&e) * inverse);
+        let g1 = -(g2 * t0 + g3 * t1);
+        let g0 = -(g1 + g2 + g3);
+        [g0, g1, g2, g3]
+    }
+
     #[inline(always)]
     fn angle(rest: &Rest, x: &[Vec3; 4]) -> Angle {
         let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
@@ -146,26 +183,19 @@ impl<L: BendingLaw> Hinges<L> {
         let e2 = e.norm_squared();
         let length = e2.sqrt();
         let value = (-length * n0.dot(&l1)).atan2(n0.dot(&n1));
-        let g2 = n0 * (-length / n0.norm_squared().max(rest.floor[0]));
-        let g3 = n1 * (-length / n1.norm_squared().max(rest.floor[1]));
-        let inverse = 1.0 / e2.max(rest.edge * rest.edge * COLLAPSED * COLLAPSED);
-        let (t0, t1) = (l0.dot(&e) * inverse, l1.dot(&e) * inverse);
-        let g1 = -(g2 * t0 + g3 * t1);
-        let g0 = -(g1 + g2 + g3);
-        Angle { value, gradient: [g0, g1, g2, g3] }
+        Angle { value, gradient: Self::gradient_of(rest, [e, l0, l1, n0, n1], e2, length) }
     }
 
-    /// Moment and slope at the angle `value`, of the element `k` of a range that turns at `rate` [rad/s].
+    /// Place and curvature at the angle `value` of the element `k` of a range; `accept` moves its memory on to there.
     #[inline(always)]
-    fn answer(
+    fn arrive(
         &self,
         rest: &Rest,
         places: &mut [L::Memory],
         k: usize,
         value: f64,
-        rate: f64,
         accept: bool,
-    ) -> Moment {
+    ) -> (L::Memory, f64) {
         let mut place = place::<L>(places, k);
         let curvature = Self::curvature(rest, &place, value);
         if accept {
@@ -174,7 +204,62 @@ impl<L: BendingLaw> Hinges<L> {
                 places[k] = place;
             }
         }
-        self.law.moment(&place, curvature, rate)
+        (place, curvature)
+    }
+
+    /// Torque of its neighbours on an element [N m].
+    #[inline(always)]
+    fn neighbour_torque(&self, element: usize, elastic: &[f64]) -> f64 {
+        self.coupled.as_ref().map_or(0.0, |coupled| coupled.torque(element, elastic))
+    }
+
+    /// What the matrix takes for its products with its neighbours [N m].
+    #[inline(always)]
+    fn bound(&self, element: usize, iterates: bool) -> f64 {
+        self.coupled.as_ref().map_or(0.0, |coupled| coupled.bounds(iterates)[element])
+    }
+
+    /// Corner forces and exact blocks of an element at a curvature; `neighbours`: their torque [N m].
+    #[inline]
+    fn exact_blocks(
+        &self,
+        element: usize,
+        x: &[Vec3],
+        v: &[Vec3],
+        linear: &super::Linear,
+        (place, curvature, neighbours): (L::Memory, f64, f64),
+        f: &mut [Vec3],
+        blocks: &mut [super::Block],
+    ) {
+        let rest = &self.rest[element];
+        let (corners, velocity) = (self.corners_of(element, x), self.corners_of(element, v));
+        let gradient = Self::gradient(rest, &corners);
+        let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
+        let answer = self.law.moment(&place, curvature, rate);
+        let per_angle = rest.edge / rest.height;
+        let stiffness = per_angle * answer.slope + self.bound(element, linear.iterates);
+        let damping = per_angle * self.damping;
+        let moment = rest.edge * answer.moment + neighbours;
+        let torque = moment + (damping + linear.ahead * stiffness) * rate;
+        let change = Self::gradient_change(rest, &corners, &velocity);
+        for c in 0..4 {
+            f[c] = gradient[c] * -torque - change[c] * (linear.ahead * moment);
+        }
+        let scale = linear.stiffness * stiffness + linear.damping * damping;
+        for b in 0..4 {
+            for axis in 0..3 {
+                let mut direction = [Vec3::zeros(); 4];
+                direction[b][axis] = 1.0;
+                let change = Self::gradient_change(rest, &corners, &direction);
+                for (p, &(row, column)) in corner_pairs(4).iter().enumerate() {
+                    if column == b {
+                        let entry = gradient[row] * (scale * gradient[b][axis])
+                            + change[row] * (linear.stiffness * moment);
+                        blocks[p][3 * axis..3 * axis + 3].copy_from_slice(entry.as_slice());
+                    }
+                }
+            }
+        }
     }
 
     /// dθ/dx's change along corner motions `d`: the exact second derivative of θ applied to `d`.
@@ -264,22 +349,65 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         self.vertices.iter().zip(places::<L>(memory)).filter_map(state).collect()
     }
 
-    fn add_energy(&self, range: Range<usize>, x: &[Vec3], memory: &[f64], energy: &mut Energy) {
+    fn coupled(&self) -> Option<EffectInfo> {
+        let bytes = self.coupled.as_ref()?.bytes();
+        Some(EffectInfo { name: "hinge coupling", elements: self.vertices.len(), bytes })
+    }
+
+    fn survey(&self, range: Range<usize>, x: &[Vec3], memory: &[f64], survey: Survey<&mut [f64]>) {
+        let places = places::<L>(memory);
+        let out = survey.elastic.iter_mut().zip(survey.work);
+        for ((k, element), (elastic, work)) in range.enumerate().zip(out) {
+            let (rest, place) = (&self.rest[element], place::<L>(places, k));
+            *work = Self::curvature(rest, &place, dihedral_angle(&self.corners_of(element, x)));
+            *elastic = rest.height * self.law.elastic(&place, *work);
+        }
+    }
+
+    fn add_energy(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        memory: &[f64],
+        survey: Survey<&[f64]>,
+        energy: &mut Energy,
+    ) {
         let places = places::<L>(memory);
         for (k, element) in range.enumerate() {
             let (rest, place) = (&self.rest[element], place::<L>(places, k));
-            let curvature = Self::curvature(rest, &place, dihedral_angle(&self.corners_of(element, x)));
+            let curvature = if self.coupled.is_some() {
+                // Half of each product: its other hinge has the other half.
+                let torque = self.neighbour_torque(element, survey.elastic);
+                energy.bending += 0.5 * survey.elastic[element] * torque;
+                survey.work[k]
+            } else {
+                Self::curvature(rest, &place, dihedral_angle(&self.corners_of(element, x)))
+            };
             energy.bending += rest.edge * rest.height * self.law.moment(&place, curvature, 0.0).energy;
         }
     }
 
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], memory: &[f64], out: &mut [Vec3]) {
+    fn forces(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        memory: &[f64],
+        survey: Survey<&[f64]>,
+        out: &mut [Vec3],
+    ) {
         let places = places::<L>(memory);
         for ((k, element), f) in range.enumerate().zip(out.chunks_exact_mut(4)) {
             let (rest, place) = (&self.rest[element], place::<L>(places, k));
-            let Angle { value, gradient } = Self::angle(rest, &self.corners_of(element, x));
-            let curvature = Self::curvature(rest, &place, value);
-            let mut torque = rest.edge * self.law.moment(&place, curvature, 0.0).moment;
+            let corners = self.corners_of(element, x);
+            let (curvature, gradient, neighbours) = if self.coupled.is_some() {
+                let neighbours = self.neighbour_torque(element, survey.elastic);
+                (survey.work[k], Self::gradient(rest, &corners), neighbours)
+            } else {
+                let Angle { value, gradient } = Self::angle(rest, &corners);
+                (Self::curvature(rest, &place, value), gradient, 0.0)
+            };
+            let mut torque = rest.edge * self.law.moment(&place, curvature, 0.0).moment + neighbours;
             if self.damping > 0.0 {
                 let rate: f64 = (0..4).map(|c| gradient[c].dot(&v[self.vertices[element][c] as usize])).sum();
                 torque += rest.edge * self.damping / rest.height * rate;
@@ -297,83 +425,143 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         v: &[Vec3],
         linear: &super::Linear,
         memory: &mut [f64],
+        survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {
-        let damping = self.damping;
         let places = places_mut::<L>(memory);
         let first = range.start;
         match couplings {
+            Couplings::Outer(outer) if self.coupled.is_some() => {
+                self.outer::<true>(first, x, v, linear, places, survey, forces, outer);
+            }
             Couplings::Outer(outer) => {
-                let blocks = forces.chunks_mut(4 * BLOCK).zip(outer.chunks_mut(BLOCK));
-                for (block, (forces, outer)) in blocks.enumerate() {
-                    // Angles first, laws after: the laws of several hinges then run side by side.
-                    let (mut angles, mut rates) = ([0.0; BLOCK], [0.0; BLOCK]);
-                    for (k, outer) in outer.iter_mut().enumerate() {
-                        let element = first + block * BLOCK + k;
-                        let Angle { value, gradient } =
-                            Self::angle(&self.rest[element], &self.corners_of(element, x));
-                        let [v0, v1, v2, v3] = self.corners_of(element, v);
-                        // Σ g_a = 0, so the rate needs differences only.
-                        rates[k] = gradient[1].dot(&(v1 - v0))
-                            + gradient[2].dot(&(v2 - v0))
-                            + gradient[3].dot(&(v3 - v0));
-                        angles[k] = value;
-                        outer.gradient = gradient.map(Into::into);
-                    }
-                    for (k, (f, outer)) in forces.chunks_exact_mut(4).zip(outer).enumerate() {
-                        let at = block * BLOCK + k;
-                        let rest = &self.rest[first + at];
-                        let answer = self.answer(rest, places, at, angles[k], rates[k], linear.accept);
-                        let per_angle = rest.edge / rest.height;
-                        // A negative slope has no place in a positive semi-definite block.
-                        let stiffness = per_angle * answer.slope.max(0.0);
-                        let damping = per_angle * damping;
-                        let torque =
-                            rest.edge * answer.moment + (damping + linear.ahead * stiffness) * rates[k];
-                        for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
-                            *f = Vec3::from(*gradient) * -torque;
-                        }
-                        outer.scale = linear.stiffness * stiffness + linear.damping * damping;
-                    }
-                }
+                self.outer::<false>(first, x, v, linear, places, survey, forces, outer);
             }
             Couplings::Blocks(blocks) => {
-                for (((k, element), f), blocks) in
-                    range.enumerate().zip(forces.chunks_exact_mut(4)).zip(blocks.chunks_exact_mut(6))
+                for ((k, element), (f, blocks)) in
+                    range.enumerate().zip(forces.chunks_exact_mut(4).zip(blocks.chunks_exact_mut(6)))
                 {
                     let rest = &self.rest[element];
-                    let corners = self.corners_of(element, x);
-                    let velocity = self.corners_of(element, v);
-                    let Angle { value, gradient } = Self::angle(rest, &corners);
-                    let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
-                    let answer = self.answer(rest, places, k, value, rate, linear.accept);
-                    let per_angle = rest.edge / rest.height;
-                    let (stiffness, damping) = (per_angle * answer.slope, per_angle * damping);
-                    let moment = rest.edge * answer.moment;
-                    let torque = moment + (damping + linear.ahead * stiffness) * rate;
-                    let change = Self::gradient_change(rest, &corners, &velocity);
-                    for c in 0..4 {
-                        f[c] = gradient[c] * -torque - change[c] * (linear.ahead * moment);
-                    }
-                    let scale = linear.stiffness * stiffness + linear.damping * damping;
-                    for b in 0..4 {
-                        for axis in 0..3 {
-                            let mut direction = [Vec3::zeros(); 4];
-                            direction[b][axis] = 1.0;
-                            let change = Self::gradient_change(rest, &corners, &direction);
-                            for (p, &(row, column)) in corner_pairs(4).iter().enumerate() {
-                                if column == b {
-                                    let entry = gradient[row] * (scale * gradient[b][axis])
-                                        + change[row] * (linear.stiffness * moment);
-                                    blocks[p][3 * axis..3 * axis + 3].copy_from_slice(entry.as_slice());
-                                }
-                            }
-                        }
+                    let value = dihedral_angle(&self.corners_of(element, x));
+                    let (place, curvature) = self.arrive(rest, places, k, value, linear.accept);
+                    if self.coupled.is_some() {
+                        survey.elastic[k] = rest.height * self.law.elastic(&place, curvature);
+                        survey.work[k] = curvature;
+                    } else {
+                        self.exact_blocks(element, x, v, linear, (place, curvature, 0.0), f, blocks);
                     }
                 }
             }
             Couplings::Diagonal(_) => unreachable!("hinges couple by blocks, element {first}"),
+        }
+    }
+
+    fn add_beyond(&self, couplings: &[Outer], d: &[Vec3], out: &mut [Vec3]) {
+        let Some(coupled) = &self.coupled else { return };
+        let elements = || couplings.iter().zip(&self.vertices);
+        let turn = |(outer, vertices): (&Outer, &[u32; 4])| -> f64 {
+            outer.gradient.iter().zip(vertices).map(|(g, &v)| Vec3::from(*g).dot(&d[v as usize])).sum()
+        };
+        let turns: Vec<f64> = elements().map(turn).collect();
+        for (element, (outer, vertices)) in elements().enumerate() {
+            let torque = coupled.torque(element, &turns) - coupled.bounds(false)[element] * turns[element];
+            for (g, &v) in outer.gradient.iter().zip(vertices) {
+                out[v as usize] += Vec3::from(*g) * torque;
+            }
+        }
+    }
+
+    fn couple(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        linear: &super::Linear,
+        memory: &[f64],
+        survey: Survey<&[f64]>,
+        forces: &mut [Vec3],
+        couplings: Couplings<'_>,
+    ) {
+        let first = range.start;
+        let elements = range.zip(survey.work).zip(forces.chunks_exact_mut(4));
+        match couplings {
+            Couplings::Outer(outer) => {
+                for (((element, own), f), outer) in elements.zip(outer) {
+                    let torque = own + self.neighbour_torque(element, survey.elastic);
+                    for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
+                        *f = Vec3::from(*gradient) * -torque;
+                    }
+                }
+            }
+            Couplings::Blocks(blocks) => {
+                let places = places::<L>(memory);
+                for (k, (((element, curvature), f), blocks)) in
+                    elements.zip(blocks.chunks_exact_mut(6)).enumerate()
+                {
+                    let at =
+                        (place::<L>(places, k), *curvature, self.neighbour_torque(element, survey.elastic));
+                    self.exact_blocks(element, x, v, linear, at, f, blocks);
+                }
+            }
+            Couplings::Diagonal(_) => unreachable!("hinges couple by blocks, element {first}"),
+        }
+    }
+}
+
+impl<L: BendingLaw> Hinges<L> {
+    /// Couplings and corner forces of the elements from `first` on; of coupled ones elastic angles and torques instead of
+    /// forces.
+    #[inline]
+    fn outer<const COUPLED: bool>(
+        &self,
+        first: usize,
+        x: &[Vec3],
+        v: &[Vec3],
+        linear: &super::Linear,
+        places: &mut [L::Memory],
+        Survey { elastic, work }: Survey<&mut [f64]>,
+        forces: &mut [Vec3],
+        outer: &mut [Outer],
+    ) {
+        let blocks = forces.chunks_mut(4 * BLOCK).zip(outer.chunks_mut(BLOCK));
+        for (block, (forces, outer)) in blocks.enumerate() {
+            // Angles first, laws after: the laws of several hinges then run side by side.
+            let (mut angles, mut rates) = ([0.0; BLOCK], [0.0; BLOCK]);
+            for (k, outer) in outer.iter_mut().enumerate() {
+                let element = first + block * BLOCK + k;
+                let Angle { value, gradient } =
+                    Self::angle(&self.rest[element], &self.corners_of(element, x));
+                let [v0, v1, v2, v3] = self.corners_of(element, v);
+                // Σ g_a = 0, so the rate needs differences only.
+                rates[k] =
+                    gradient[1].dot(&(v1 - v0)) + gradient[2].dot(&(v2 - v0)) + gradient[3].dot(&(v3 - v0));
+                angles[k] = value;
+                outer.gradient = gradient.map(Into::into);
+            }
+            for (k, (f, outer)) in forces.chunks_exact_mut(4).zip(outer).enumerate() {
+                let at = block * BLOCK + k;
+                let rest = &self.rest[first + at];
+                let (place, curvature) = self.arrive(rest, places, at, angles[k], linear.accept);
+                let answer = self.law.moment(&place, curvature, rates[k]);
+                let per_angle = rest.edge / rest.height;
+                // A negative slope has no place in a positive semi-definite block.
+                let mut stiffness = per_angle * answer.slope.max(0.0);
+                if COUPLED {
+                    stiffness += self.bound(first + at, linear.iterates);
+                }
+                let damping = per_angle * self.damping;
+                let torque = rest.edge * answer.moment + (damping + linear.ahead * stiffness) * rates[k];
+                if COUPLED {
+                    elastic[at] = rest.height * self.law.elastic(&place, curvature);
+                    work[at] = torque;
+                } else {
+                    for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
+                        *f = Vec3::from(*gradient) * -torque;
+                    }
+                }
+                outer.scale = linear.stiffness * stiffness + linear.damping * damping;
+            }
         }
     }
 }

@@ -12,6 +12,7 @@
 //! and vanishes with the velocity, so a linearised step stays consistent of order one.
 
 pub(crate) mod air;
+pub(crate) mod coupled;
 pub(crate) mod hinge;
 pub(crate) mod spring;
 pub(crate) mod stretch_shear;
@@ -69,6 +70,8 @@ pub(crate) struct Linear {
     pub(crate) stiffness: f64,
     /// Corner forces are f + `ahead` · K_x v, with the K_x of the couplings [s].
     pub(crate) ahead: f64,
+    /// Whether iterations follow, which make up for what the couplings are not exact in.
+    pub(crate) iterates: bool,
     /// Whether `x` has been accepted as the end of a motion: laws with memory then move on to it first.
     pub(crate) accept: bool,
     pub(crate) psd: Psd,
@@ -92,7 +95,20 @@ pub(crate) enum Couplings<'a> {
     Diagonal(&'a mut [f64]),
 }
 
+/// What the elements of a coupled model see of each other, two numbers per element; empty for models whose elements
+/// stand alone. `elastic` is that of all elements where a pass reads it, of its range where it writes it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Survey<T> {
+    /// Elastic angle [rad].
+    pub(crate) elastic: T,
+    /// Of a range: the curvature [1/m] after a survey, what [`ForceModel::couple`] needs after a linearisation.
+    pub(crate) work: T,
+}
+
 /// A list of elements with one law.
+///
+/// Of a coupled model, energy and forces are asked for after a survey of all elements at the same state, and a
+/// linearisation is complete after [`ForceModel::couple`] of all.
 pub(crate) trait ForceModel: Send + Sync {
     /// Name, number of elements, memory.
     fn info(&self) -> EffectInfo;
@@ -103,9 +119,24 @@ pub(crate) trait ForceModel: Send + Sync {
     /// Form of the couplings that `linearise` writes.
     fn coupling(&self, psd: Psd) -> CouplingKind;
     /// Adds the energy of a range of elements [J]. `memory`: that of the range, here and below.
-    fn add_energy(&self, range: Range<usize>, x: &[Vec3], memory: &[f64], energy: &mut Energy);
+    fn add_energy(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        memory: &[f64],
+        survey: Survey<&[f64]>,
+        energy: &mut Energy,
+    );
     /// Corner forces of a range of elements [N]: `corners` entries per element.
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], memory: &[f64], out: &mut [Vec3]);
+    fn forces(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        memory: &[f64],
+        survey: Survey<&[f64]>,
+        out: &mut [Vec3],
+    );
     /// Corner forces and couplings of a range of elements. Memory moves on where [`Linear::accept`] says so.
     fn linearise(
         &self,
@@ -114,11 +145,38 @@ pub(crate) trait ForceModel: Send + Sync {
         v: &[Vec3],
         linear: &Linear,
         memory: &mut [f64],
+        survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     );
     /// Whether it dissipates: its force is then not the gradient of an energy.
     fn dissipates(&self) -> bool;
+
+    /// What the coupling of its elements takes; none where they stand alone.
+    fn coupled(&self) -> Option<EffectInfo> {
+        None
+    }
+
+    /// Looks at a range of elements of a coupled model.
+    fn survey(&self, _range: Range<usize>, _x: &[Vec3], _memory: &[f64], _survey: Survey<&mut [f64]>) {}
+
+    /// Second pass of [`ForceModel::linearise`] over a coupled model.
+    fn couple(
+        &self,
+        _range: Range<usize>,
+        _x: &[Vec3],
+        _v: &[Vec3],
+        _linear: &Linear,
+        _memory: &[f64],
+        _survey: Survey<&[f64]>,
+        _forces: &mut [Vec3],
+        _couplings: Couplings<'_>,
+    ) {
+    }
+
+    /// Adds to `out` what the exact −K_x of a coupled model makes of the corner motions `d` beyond its `couplings` of a
+    /// single step.
+    fn add_beyond(&self, _couplings: &[Outer], _d: &[Vec3], _out: &mut [Vec3]) {}
 
     /// Whether it resists bending.
     fn bends(&self) -> bool {

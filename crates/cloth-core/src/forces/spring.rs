@@ -11,7 +11,7 @@
 
 use std::ops::Range;
 
-use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd};
+use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey};
 use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
 
 /// Length relative to the rest length under which a spring has no direction.
@@ -117,7 +117,14 @@ impl ForceModel for Springs {
         self.damping > 0.0
     }
 
-    fn add_energy(&self, range: Range<usize>, x: &[Vec3], _memory: &[f64], energy: &mut Energy) {
+    fn add_energy(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        _memory: &[f64],
+        _survey: Survey<&[f64]>,
+        energy: &mut Energy,
+    ) {
         let mut sum = 0.0;
         for element in range {
             let [a, b] = self.vertices[element].map(|i| i as usize);
@@ -130,7 +137,15 @@ impl ForceModel for Springs {
         }
     }
 
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], _memory: &[f64], out: &mut [Vec3]) {
+    fn forces(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        _memory: &[f64],
+        _survey: Survey<&[f64]>,
+        out: &mut [Vec3],
+    ) {
         for (element, f) in range.zip(out.chunks_exact_mut(2)) {
             let spring = self.spring(element, x, v);
             f[0] = spring.tension * spring.along;
@@ -145,6 +160,7 @@ impl ForceModel for Springs {
         v: &[Vec3],
         linear: &Linear,
         _memory: &mut [f64],
+        _survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {

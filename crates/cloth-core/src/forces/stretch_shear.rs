@@ -18,7 +18,7 @@
 
 use std::ops::Range;
 
-use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd};
+use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey};
 use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
 
 /// Length of w under which it has no direction.
@@ -155,7 +155,14 @@ impl ForceModel for StretchShear {
         self.stiffness.damping > 0.0
     }
 
-    fn add_energy(&self, range: Range<usize>, x: &[Vec3], _memory: &[f64], energy: &mut Energy) {
+    fn add_energy(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        _memory: &[f64],
+        _survey: Survey<&[f64]>,
+        energy: &mut Energy,
+    ) {
         let k = &self.stiffness;
         for element in range {
             let (wu, wv) = self.images(element, x);
@@ -166,7 +173,15 @@ impl ForceModel for StretchShear {
         }
     }
 
-    fn forces(&self, range: Range<usize>, x: &[Vec3], v: &[Vec3], _memory: &[f64], out: &mut [Vec3]) {
+    fn forces(
+        &self,
+        range: Range<usize>,
+        x: &[Vec3],
+        v: &[Vec3],
+        _memory: &[f64],
+        _survey: Survey<&[f64]>,
+        out: &mut [Vec3],
+    ) {
         let k = self.stiffness;
         for (element, f) in range.zip(out.chunks_exact_mut(3)) {
             let rest = &self.rest[element];
@@ -191,6 +206,7 @@ impl ForceModel for StretchShear {
         v: &[Vec3],
         linear: &Linear,
         _memory: &mut [f64],
+        _survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {

@@ -4,13 +4,13 @@ use std::{sync::Arc, time::Instant};
 
 use nalgebra::Matrix3;
 
-use super::{IntegratorParams, Prescribed};
+use super::{IntegratorParams, Prescribed, constraints::Held};
 use crate::{
     ClothSystem, Psd, StepError,
     assembly::{Assembler, BlockMatrix, Corners},
     forces::Linear,
     mesh::Vec3,
-    solver::{SolveInfo, Solver},
+    solver::{SolveInfo, Solver, SolverParams},
 };
 
 /// Work space of the implicit schemes.
@@ -26,6 +26,8 @@ pub(super) struct Workspace {
     pub(super) x: Vec<Vec3>,
     pub(super) v: Vec<Vec3>,
     pub(super) residual: Vec<Vec3>,
+    /// What a step with constraints needs; none before the first one.
+    pub(super) held: Option<Box<Held>>,
 }
 
 /// Seconds per stage of one step.
@@ -66,6 +68,7 @@ impl Workspace {
             x: trial(),
             v: trial(),
             residual: trial(),
+            held: None,
         }
     }
 
@@ -73,6 +76,7 @@ impl Workspace {
         self.assembler.bytes()
             + self.matrix.bytes()
             + self.solver.bytes()
+            + self.held.as_ref().map_or(0, |h| h.bytes())
             + size_of::<Vec3>()
                 * (self.corners.forces.len() + self.b.len() + self.dv.len() + 3 * self.x.len())
     }
@@ -88,7 +92,9 @@ impl Workspace {
         ahead: f64,
     ) {
         let start = Instant::now();
-        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, accept: false, psd };
+        // Newton's method alone asks for forces with no step ahead of them.
+        let iterates = ahead == 0.0;
+        let linear = Linear { damping: dt, stiffness: dt * dt, ahead, iterates, accept: false, psd };
         system.linearise(&mut self.assembler.elements, &mut self.corners, x, v, linear);
         let middle = Instant::now();
         let masses = system.masses();
@@ -114,11 +120,11 @@ impl Workspace {
     /// Solves A dv = b; `dv` holds the prescribed values on entry.
     pub(super) fn solve(
         &mut self,
-        params: &IntegratorParams,
+        params: &SolverParams,
         pins: &Prescribed<'_>,
     ) -> Result<SolveInfo, StepError> {
         let start = Instant::now();
-        let info = self.solver.solve(&self.matrix, &self.b, pins.pinned, &mut self.dv, &params.solver);
+        let info = self.solver.solve(&self.matrix, &self.b, pins.pinned, &mut self.dv, params);
         self.clock.solve += start.elapsed().as_secs_f64();
         info.map_err(|error| StepError::Solver { error, vertices: self.suspects(pins.pinned) })
     }

@@ -2,7 +2,7 @@
 //!
 //! Source: thesis (3.20)–(3.25), with dt K_x v in the right-hand side; Baraff and Witkin 1998 for the pins.
 
-use super::{IntegratorParams, Prescribed, StepInfo, implicit::Workspace};
+use super::{ActiveSet, IntegratorParams, Prescribed, StepInfo, implicit::Workspace};
 use crate::{ClothSystem, StepError, mesh::Vec3};
 
 pub(super) fn step(
@@ -13,6 +13,7 @@ pub(super) fn step(
     v: &mut [Vec3],
     dt: f64,
     pins: &Prescribed<'_>,
+    set: Option<&mut dyn ActiveSet>,
 ) -> Result<StepInfo, StepError> {
     work.start();
     work.linearise(system, params.psd, x, v, dt, dt);
@@ -21,7 +22,10 @@ pub(super) fn step(
         let i = vertex as usize;
         work.dv[i] = (x_t1 - x[i]) / dt - v[i];
     }
-    let solved = work.solve(params, pins)?;
+    let solved = match set {
+        None => work.solve(&params.solver, pins)?,
+        Some(set) => work.solve_held(params, pins, v, set)?,
+    };
     for ((x, v), dv) in x.iter_mut().zip(v.iter_mut()).zip(&work.dv) {
         *v += dv;
         *x += *v * dt;

@@ -1,5 +1,6 @@
 //! From one state to the next.
 
+mod constraints;
 mod explicit;
 mod implicit;
 mod implicit_euler;
@@ -11,6 +12,8 @@ mod stability;
 use std::sync::Arc;
 
 use crate::{ClothSystem, CoreError, Psd, SolverParams, StepError, mesh::Vec3};
+
+pub use constraints::{ActiveSet, Constraint};
 
 /// Time integration scheme.
 #[derive(
@@ -208,6 +211,38 @@ impl Integrator {
         dt: f64,
         pins: &Pins<'_>,
     ) -> Result<StepInfo, StepError> {
+        self.run(x, v, dt, pins, None)
+    }
+
+    /// [`Integrator::step`] of an implicit scheme under the constraints that `set` chooses.
+    ///
+    /// Constraints hold (x_t1 − x_t0)/dt, and along held directions v_t1 is the same. The semi-implicit scheme's
+    /// sub-steps know nothing of them: there the impulses that `set` sees hold bending at its mean over the sub-steps.
+    ///
+    /// # Errors
+    /// As [`Integrator::step`]; [`StepError::Constraint`] naming the first wrong entry, or for an explicit scheme.
+    pub fn step_with(
+        &mut self,
+        x: &mut [Vec3],
+        v: &mut [Vec3],
+        dt: f64,
+        pins: &Pins<'_>,
+        set: &mut dyn ActiveSet,
+    ) -> Result<StepInfo, StepError> {
+        if self.params.method.is_explicit() {
+            return Err(StepError::Constraint { entry: 0, expected: "an implicit scheme" });
+        }
+        self.run(x, v, dt, pins, Some(set))
+    }
+
+    fn run(
+        &mut self,
+        x: &mut [Vec3],
+        v: &mut [Vec3],
+        dt: f64,
+        pins: &Pins<'_>,
+        set: Option<&mut dyn ActiveSet>,
+    ) -> Result<StepInfo, StepError> {
         if !(dt.is_finite() && dt > 0.0) {
             return Err(StepError::TimeStep { got: dt });
         }
@@ -227,21 +262,17 @@ impl Integrator {
             // That one moves memory on as it linearises at x, in one pass.
             pool.install(|| system.settle(x));
         }
+        let prescribed = Prescribed { pins, pinned };
         let result = pool.install(|| match work {
-            Work::Explicit(buffers) => {
-                Ok(buffers.step(system, params.method, x, v, dt, &Prescribed { pins, pinned }))
-            }
+            Work::Explicit(buffers) => Ok(buffers.step(system, params.method, x, v, dt, &prescribed)),
             Work::Implicit(work) => {
-                let pins = Prescribed { pins, pinned };
-                if params.method == Method::ImplicitNewton {
-                    newton::step(work, system, params, x, v, dt, &pins)
-                } else {
-                    implicit_euler::step(work, system, params, x, v, dt, &pins)
-                }
+                let step =
+                    if params.method == Method::ImplicitNewton { newton::step } else { implicit_euler::step };
+                step(work, system, params, x, v, dt, &prescribed, set)
             }
             Work::SemiImplicit(work) => {
                 let (sub_steps, work) = &mut **work;
-                sub_steps.step(work, system, params, x, v, dt, &Prescribed { pins, pinned })
+                sub_steps.step(work, system, params, x, v, dt, &prescribed, set)
             }
         });
         for &vertex in pins.vertices {

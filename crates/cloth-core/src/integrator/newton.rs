@@ -9,7 +9,8 @@
 use std::time::Instant;
 
 use super::{
-    IntegratorParams, Prescribed, StepInfo,
+    ActiveSet, IntegratorParams, Prescribed, StepInfo,
+    constraints::Held,
     implicit::Workspace,
     line_search::{Merit, accepted},
 };
@@ -26,6 +27,7 @@ pub(super) fn step(
     v: &mut [Vec3],
     dt: f64,
     pins: &Prescribed<'_>,
+    set: Option<&mut dyn ActiveSet>,
 ) -> Result<StepInfo, StepError> {
     work.start();
     let conservative = !system.dissipates();
@@ -34,7 +36,30 @@ pub(super) fn step(
     for (&vertex, x_t1) in pins.pins.vertices.iter().zip(pins.pins.x_t1) {
         v1[vertex as usize] = (x_t1 - x[vertex as usize]) / dt;
     }
-    let result = iterate(work, system, params, x, v, &mut x1, &mut v1, dt, pins, conservative);
+    let result = match set {
+        None => {
+            iterate(work, system, params, x, v, &mut x1, &mut v1, dt, pins, conservative, None, &mut None)
+        }
+        Some(set) => {
+            let mut held = work.held.take().unwrap_or_default();
+            let result = iterate_active(
+                work,
+                system,
+                params,
+                x,
+                v,
+                &mut x1,
+                &mut v1,
+                dt,
+                pins,
+                conservative,
+                &mut held,
+                set,
+            );
+            work.held = Some(held);
+            result
+        }
+    };
     if result.is_ok() {
         x.copy_from_slice(&x1);
         v.copy_from_slice(&v1);
@@ -42,6 +67,37 @@ pub(super) fn step(
     }
     (work.x, work.v) = (x1, v1);
     result
+}
+
+/// Newton's method for one set of constraints after the other, each from the solution before it.
+fn iterate_active(
+    work: &mut Workspace,
+    system: &mut ClothSystem,
+    params: &IntegratorParams,
+    x: &[Vec3],
+    v: &[Vec3],
+    x1: &mut [Vec3],
+    v1: &mut [Vec3],
+    dt: f64,
+    pins: &Prescribed<'_>,
+    conservative: bool,
+    held: &mut Held,
+    set: &mut dyn ActiveSet,
+) -> Result<StepInfo, StepError> {
+    let (mut total, mut first) = (StepInfo::default(), None);
+    loop {
+        held.take(set, pins)?;
+        held.hold(v1);
+        let now = Some(&mut *held);
+        let info = iterate(work, system, params, x, v, x1, v1, dt, pins, conservative, now, &mut first)?;
+        let before = (total.newton_iterations, total.linear_iterations);
+        total = info;
+        total.newton_iterations += before.0;
+        total.linear_iterations += before.1;
+        if !set.judge(v1, &held.impulses) {
+            return Ok(total);
+        }
+    }
 }
 
 fn iterate(
@@ -55,14 +111,17 @@ fn iterate(
     dt: f64,
     pins: &Prescribed<'_>,
     conservative: bool,
+    mut held: Option<&mut Held>,
+    first: &mut Option<f64>,
 ) -> Result<StepInfo, StepError> {
     let mut info = StepInfo::default();
     let mut floor = 0.0;
     advance(x, v1, dt, x1);
     let start = Instant::now();
-    let mut merit = evaluate(work, system, v, x1, v1, dt, pins);
+    let mut merit = evaluate(work, system, v, x1, v1, dt, pins, held.as_deref_mut());
     work.clock.forces += start.elapsed().as_secs_f64();
-    let first = merit.residual;
+    // What a further set of constraints starts from is small where it changes little.
+    let first = *first.get_or_insert(merit.residual);
     loop {
         info.residual = if first > 0.0 { merit.residual / first } else { 0.0 };
         info.converged = merit.residual <= (params.newton_tolerance * first).max(floor);
@@ -79,7 +138,15 @@ fn iterate(
         for &vertex in pins.pins.vertices {
             work.dv[vertex as usize] = Vec3::zeros();
         }
-        let solved = work.solve(params, pins)?;
+        let solved = match held.as_deref_mut() {
+            None => work.solve(&params.solver, pins)?,
+            Some(held) => {
+                for c in held.list.iter().filter(|c| c.count == 3) {
+                    work.dv[c.vertex as usize] = Vec3::zeros();
+                }
+                work.solve_projected(held, &params.solver, pins)?
+            }
+        };
         info.linear_iterations += solved.iterations;
         info.newton_iterations += 1;
 
@@ -94,7 +161,7 @@ fn iterate(
             }
             taken = alpha;
             advance(x, v1, dt, x1);
-            let trial = evaluate(work, system, v, x1, v1, dt, pins);
+            let trial = evaluate(work, system, v, x1, v1, dt, pins, held.as_deref_mut());
             if accepted(&merit, &trial, alpha, slope, conservative) {
                 found = Some(trial);
                 break;
@@ -110,6 +177,9 @@ fn iterate(
                 *v1 -= d * taken;
             }
             advance(x, v1, dt, x1);
+            if held.is_some() {
+                evaluate(work, system, v, x1, v1, dt, pins, held);
+            }
             info.converged = merit.residual <= floor;
             break;
         }
@@ -135,10 +205,11 @@ fn evaluate(
     v1: &[Vec3],
     dt: f64,
     pins: &Prescribed<'_>,
+    held: Option<&mut Held>,
 ) -> Merit {
     work.corners.evaluate(system.models(), system.settled_memory(), x1, v1);
     system.gather(&mut work.corners, v1, -dt, &mut work.residual);
-    let mut potential = system.potential(x1, v1, dt, &mut work.corners.clock);
+    let mut potential = system.potential(x1, v1, dt, &mut work.corners);
     let mut squares = 0.0;
     for (i, (r, m)) in work.residual.iter_mut().zip(system.masses()).enumerate() {
         let dv = v1[i] - v0[i];
@@ -149,6 +220,10 @@ fn evaluate(
             *r += dv * *m;
         }
         squares += r.norm_squared();
+    }
+    if let Some(held) = held {
+        potential += held.judge_residual(&mut work.residual, v1);
+        squares = work.residual.iter().map(Vec3::norm_squared).sum();
     }
     Merit { potential, residual: squares.sqrt() }
 }

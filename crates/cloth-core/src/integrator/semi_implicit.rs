@@ -14,7 +14,7 @@
 
 use std::time::Instant;
 
-use super::{IntegratorParams, Prescribed, StepInfo, implicit::Workspace, implicit_euler};
+use super::{ActiveSet, IntegratorParams, Prescribed, StepInfo, implicit::Workspace, implicit_euler};
 use crate::{ClothSystem, StepError, assembly::Corners, mesh::Vec3};
 
 /// Work space of the sub-steps.
@@ -52,7 +52,9 @@ impl SubSteps {
         v: &mut [Vec3],
         dt: f64,
         pins: &Prescribed<'_>,
+        set: Option<&mut dyn ActiveSet>,
     ) -> Result<StepInfo, StepError> {
+        let constrained = set.is_some();
         let start = Instant::now();
         self.corners.clock.reset();
         self.x.copy_from_slice(x);
@@ -69,9 +71,13 @@ impl SubSteps {
         for (end, mean) in self.v.iter_mut().zip(&self.mean) {
             *end -= mean;
         }
-        let mut info = implicit_euler::step(work, system, params, x, &mut self.mean, dt, pins)?;
+        let mut info = implicit_euler::step(work, system, params, x, &mut self.mean, dt, pins, set)?;
         for ((v, end), mean) in v.iter_mut().zip(&self.v).zip(&self.mean) {
             *v = end + mean;
+        }
+        if constrained && let Some(held) = &work.held {
+            // Along held directions v_t1 is the mean velocity: bending in the sub-steps does not push past what holds.
+            held.hold(v);
         }
         pins.place(x, v);
         info.seconds.insert(0, ("bending sub-steps", sub_steps));

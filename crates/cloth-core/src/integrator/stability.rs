@@ -7,7 +7,8 @@
 //!
 //! For the bending sub-steps of the semi-implicit scheme, symplectic Euler: ω² dt² + 2 β dt ≤ 4.
 //!
-//! K is taken with the projected blocks: compressed parts are unstable in nature, not through the step.
+//! K is taken with the projected blocks: compressed parts are unstable in nature, not through the step. What hinges owe
+//! their neighbours is taken exactly, not by its bound.
 
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};
 
@@ -33,7 +34,8 @@ pub(super) fn stable_step(system: &ClothSystem, method: Method, x: &[Vec3], v: &
     let mut corners = Corners::new(system.models());
     let mut memory = system.settled_memory().to_vec();
     let mut build = |damping: f64, stiffness: f64| {
-        let linear = Linear { damping, stiffness, ahead: 0.0, accept: false, psd: Psd::Projected };
+        let linear =
+            Linear { damping, stiffness, ahead: 0.0, iterates: false, accept: false, psd: Psd::Projected };
         assembler.elements.linearise(system.models(), &mut memory, &mut corners, x, v, &linear);
         let mut matrix = BlockMatrix::new(pattern.clone());
         let rate = damping * system.air_damping();
@@ -43,14 +45,28 @@ pub(super) fn stable_step(system: &ClothSystem, method: Method, x: &[Vec3], v: &
     let stiffness = build(0.0, 1.0);
     let damping = build(1.0, 0.0);
     let scale: Vec<f64> = system.masses().iter().map(|m| 1.0 / m.sqrt()).collect();
+    // Gradients of couplings do not depend on the factors that they were last built with.
+    let beyond = |q: &DVector<f64>, out: &mut DVector<f64>| {
+        let d: Vec<Vec3> = scale.iter().enumerate().map(|(i, s)| q.fixed_rows::<3>(3 * i) * *s).collect();
+        let mut forces = vec![Vec3::zeros(); d.len()];
+        assembler.elements.add_beyond(system.models(), &d, &mut forces);
+        for (i, (force, s)) in forces.iter().zip(&scale).enumerate() {
+            let mut rows = out.fixed_rows_mut::<3>(3 * i);
+            rows += force * *s;
+        }
+    };
+    let stiff = |q: &DVector<f64>| {
+        let mut out = product(&stiffness, &scale, q);
+        beyond(q, &mut out);
+        out
+    };
+    let damped = |q: &DVector<f64>| product(&damping, &scale, q);
 
     let mut step = f64::INFINITY;
-    for matrix in [&stiffness, &damping] {
-        for q in ritz_vectors(matrix, &scale) {
-            let mode =
-                Mode { squared: rayleigh(&stiffness, &scale, &q), rate: rayleigh(&damping, &scale, &q) };
-            step = step.min(mode.largest_step(method));
-        }
+    let n = 3 * scale.len();
+    for q in ritz_vectors(&stiff, n).into_iter().chain(ritz_vectors(&damped, n)) {
+        let mode = Mode { squared: q.dot(&stiff(&q)).max(0.0), rate: q.dot(&damped(&q)).max(0.0) };
+        step = step.min(mode.largest_step(method));
     }
     // ω grows with the root of the stiffness.
     step / system.stiffening().sqrt()
@@ -68,14 +84,8 @@ fn product(matrix: &BlockMatrix, scale: &[f64], q: &DVector<f64>) -> DVector<f64
     DVector::from_fn(q.len(), |k, _| out[k / 3].0[k % 3] * scale[k / 3])
 }
 
-/// qᵀ S A S q for a unit vector q.
-fn rayleigh(matrix: &BlockMatrix, scale: &[f64], q: &DVector<f64>) -> f64 {
-    q.dot(&product(matrix, scale, q)).max(0.0)
-}
-
-/// Unit Ritz vectors of S A S, with full reorthogonalisation.
-fn ritz_vectors(matrix: &BlockMatrix, scale: &[f64]) -> Vec<DVector<f64>> {
-    let n = 3 * scale.len();
+/// Unit Ritz vectors of an n × n matrix that is known by its products, with full reorthogonalisation.
+fn ritz_vectors(multiply: &impl Fn(&DVector<f64>) -> DVector<f64>, n: usize) -> Vec<DVector<f64>> {
     // A fixed start with all wavelengths and directions in it.
     let mut q = DVector::from_fn(n, |k, _| {
         let hash = (k as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 33;
@@ -85,7 +95,7 @@ fn ritz_vectors(matrix: &BlockMatrix, scale: &[f64]) -> Vec<DVector<f64>> {
     let mut basis: Vec<DVector<f64>> = Vec::new();
     let (mut alphas, mut betas) = (Vec::new(), Vec::new());
     while basis.len() < VECTORS.min(n) {
-        let mut w = product(matrix, scale, &q);
+        let mut w = multiply(&q);
         let size = w.norm();
         alphas.push(q.dot(&w));
         basis.push(q);

@@ -6,6 +6,20 @@ use crate::{
     bending::{Curve, Hysteresis, Law, Linear, Plastic},
 };
 
+/// How the hinges of a triangle answer to each other.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum HingeCoupling {
+    /// As a plate: the mesh bends with the rigidity of the material whatever way it is cut into triangles.
+    #[default]
+    Coupled,
+    /// Not at all: each hinge bends by itself, as in the thesis. The mesh then has a rigidity of its own, 0.8 to 1 of the
+    /// material's.
+    Independent,
+}
+
 /// Out-of-plane law.
 #[derive(
     Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
@@ -33,6 +47,9 @@ pub enum Bending {
         /// Damping time [s]: the damping moment is this times the rigidity times the rate of curvature.
         #[serde(default)]
         damping: f64,
+        /// Whether the elastic part acts across the hinges of a triangle.
+        #[serde(default)]
+        hinges: HingeCoupling,
     },
     /// Moment that softens with curvature, the same way there and back (4.1–4.3).
     Nonlinear(NonlinearBending),
@@ -82,6 +99,8 @@ pub struct NonlinearBending {
     pub c1: Option<f64>,
     /// Damping time [s]: the damping moment is this times b2 times the rate of curvature.
     pub damping: f64,
+    /// Whether the elastic part b2 K acts across the hinges of a triangle.
+    pub hinges: HingeCoupling,
 }
 
 /// Elastic limit and plastic flow.
@@ -98,6 +117,9 @@ pub struct PlasticBending {
     /// Damping time [s]: the damping moment is this times the rigidity times the rate of curvature.
     #[serde(default)]
     pub damping: f64,
+    /// Whether the elastic part acts across the hinges of a triangle.
+    #[serde(default)]
+    pub hinges: HingeCoupling,
 }
 
 /// Hysteresis: the curve of first loading as in [`NonlinearBending`], and how much of a bend stays.
@@ -130,6 +152,8 @@ pub struct HysteresisBending {
     pub fatigue: f64,
     /// Damping time [s]: the damping moment is this times b2 times the rate of curvature.
     pub damping: f64,
+    /// Whether the elastic part b2 K acts across the hinges of a triangle.
+    pub hinges: HingeCoupling,
 }
 
 /// Transition curvature where none is given [1/m]: the bending tester of Kawabata's system reads B between 0.5 and
@@ -181,8 +205,16 @@ impl HysteresisBending {
     /// # Errors
     /// As [`NonlinearBending::curve`] and [`Hysteresis::new`].
     pub fn law(&self) -> Result<Hysteresis, CoreError> {
-        let Self { rigidity, coercive_couple, transition_curvature, b1, b2, c1, damping, .. } = *self;
-        let curve = NonlinearBending { rigidity, coercive_couple, transition_curvature, b1, b2, c1, damping };
+        let Self { rigidity, coercive_couple, transition_curvature, b1, b2, c1, .. } = *self;
+        let curve = NonlinearBending {
+            rigidity,
+            coercive_couple,
+            transition_curvature,
+            b1,
+            b2,
+            c1,
+            ..NonlinearBending::default()
+        };
         Hysteresis::new(curve.curve()?, self.plasticity, self.fatigue)
     }
 }
@@ -212,6 +244,30 @@ impl Bending {
         })
     }
 
+    /// How its hinges answer to each other; none without hinges.
+    pub fn hinges(&self) -> Option<HingeCoupling> {
+        match self {
+            Self::None | Self::Spring { .. } => None,
+            Self::Hinge { hinges, .. } => Some(*hinges),
+            Self::Nonlinear(law) => Some(law.hinges),
+            Self::Plastic(law) => Some(law.hinges),
+            Self::Hysteresis(law) => Some(law.hinges),
+        }
+    }
+
+    /// The same law with hinges that answer to each other as asked for; as it is without hinges.
+    #[must_use]
+    pub fn with_hinges(mut self, coupling: HingeCoupling) -> Self {
+        match &mut self {
+            Self::None | Self::Spring { .. } => {}
+            Self::Hinge { hinges, .. } => *hinges = coupling,
+            Self::Nonlinear(law) => law.hinges = coupling,
+            Self::Plastic(law) => law.hinges = coupling,
+            Self::Hysteresis(law) => law.hinges = coupling,
+        }
+        self
+    }
+
     /// Refuses values that give no law.
     ///
     /// # Errors
@@ -224,7 +280,7 @@ impl Bending {
                 ("bending.stiffness", "a value ≥ 0 in N/m", *stiffness),
                 ("bending.damping", "a value ≥ 0 in N s/m", *damping),
             ]),
-            Self::Hinge { rigidity, damping } => Linear::new(*rigidity).and(time(*damping)),
+            Self::Hinge { rigidity, damping, .. } => Linear::new(*rigidity).and(time(*damping)),
             Self::Nonlinear(law) => law.curve().and(time(law.damping)),
             Self::Plastic(law) => law.law().and(time(law.damping)),
             Self::Hysteresis(law) => law.law().and(time(law.damping)),
@@ -246,6 +302,7 @@ mod tests {
         plasticity: 0.1,
         fatigue: 0.02,
         damping: 0.0,
+        hinges: HingeCoupling::Coupled,
     };
 
     fn name(bending: Bending) -> &'static str {
@@ -285,7 +342,13 @@ mod tests {
         assert_eq!(name(hysteresis(HysteresisBending { plasticity: 1.5, ..MEASURED })), "bending.plasticity");
         assert_eq!(name(hysteresis(HysteresisBending { fatigue: -0.1, ..MEASURED })), "bending.fatigue");
         assert_eq!(name(hysteresis(HysteresisBending { damping: f64::NAN, ..MEASURED })), "bending.damping");
-        let plastic = PlasticBending { rigidity: 1.0, elastic_limit: 0.0, hardening: 0.0, damping: 0.0 };
+        let plastic = PlasticBending {
+            rigidity: 1.0,
+            elastic_limit: 0.0,
+            hardening: 0.0,
+            damping: 0.0,
+            hinges: HingeCoupling::Coupled,
+        };
         assert_eq!(name(Bending::Plastic(plastic)), "bending.elastic_limit");
     }
 
@@ -294,7 +357,7 @@ mod tests {
         let text = serde_json::to_string(&Bending::Hysteresis(MEASURED)).unwrap();
         assert_eq!(serde_json::from_str::<Bending>(&text).unwrap(), Bending::Hysteresis(MEASURED));
         let linear: Bending = serde_json::from_str(r#"{"model": "linear", "rigidity": 1.0}"#).unwrap();
-        assert_eq!(linear, Bending::Hinge { rigidity: 1.0, damping: 0.0 });
+        assert_eq!(linear, Bending::Hinge { rigidity: 1.0, damping: 0.0, hinges: HingeCoupling::Coupled });
         let error = serde_json::from_str::<Bending>(r#"{"model": "hysteresis", "b4": 1.0}"#).unwrap_err();
         assert!(error.to_string().contains("b4"), "{error}");
         assert!(serde_json::from_str::<Bending>(r#"{"model": "rubber"}"#).is_err());

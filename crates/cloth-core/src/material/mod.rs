@@ -3,7 +3,7 @@
 mod bending;
 pub mod library;
 
-pub use bending::{Bending, HysteresisBending, NonlinearBending, PlasticBending};
+pub use bending::{Bending, HingeCoupling, HysteresisBending, NonlinearBending, PlasticBending};
 
 use crate::CoreError;
 

@@ -6,8 +6,8 @@
 use std::sync::Arc;
 
 use cloth_core::{
-    Bending, ClothPart, ClothSystem, Environment, InPlane, Integrator, IntegratorParams, Material, Method,
-    Pins,
+    Bending, ClothPart, ClothSystem, Environment, HingeCoupling, InPlane, Integrator, IntegratorParams,
+    Material, Method, Pins,
     mesh::{RestShape, Topology, TriMesh, Vec3, generators},
 };
 
@@ -31,7 +31,7 @@ pub(crate) fn system(mesh: &TriMesh, material: &Material, env: &Environment) -> 
 pub(crate) const SOFT: Material = Material {
     areal_density: 0.3,
     in_plane: InPlane::BaraffWitkin { warp: 8.0, weft: 6.0, shear: 2.0, damping: 0.02 },
-    bending: Bending::Hinge { rigidity: 1e-3, damping: 0.02 },
+    bending: Bending::Hinge { rigidity: 1e-3, damping: 0.02, hinges: HingeCoupling::Coupled },
 };
 
 pub(crate) const SPRINGS: Material = Material {

@@ -1,6 +1,6 @@
 //! Value ranges and what belongs together, as far as the scene alone can tell.
 
-use super::{Cloth, Collider, Keyframe, MaterialChoice, Pin, Rotation, Scene, SceneError};
+use super::{Cloth, Collider, ContactMethod, Keyframe, MaterialChoice, Pin, Rotation, Scene, SceneError};
 use cloth_core::{CoreError, material::library};
 
 impl Scene {
@@ -35,6 +35,8 @@ impl Scene {
         self.not_negative("output.checkpoint_interval", self.output.checkpoint_interval, "s")?;
         self.check_contact()?;
         self.check_names()?;
+        self.check_all_friction()?;
+        self.check_strain_limits()?;
         for (i, cloth) in self.cloth.iter().enumerate() {
             self.check_cloth(cloth, &format!("cloth[{i}]"))?;
         }
@@ -47,10 +49,13 @@ impl Scene {
     fn check_contact(&self) -> Result<(), SceneError> {
         let Some(contact) = &self.contact else { return Ok(()) };
         self.positive("contact.thickness", contact.thickness, "m")?;
-        self.not_negative("contact.friction", contact.friction, "")?;
-        self.not_negative("contact.self_friction", contact.self_friction, "")?;
         self.not_negative("contact.repulsion_stiffness", contact.repulsion_stiffness, "N/m")?;
         self.at_least_one("contact.max_passes", contact.max_passes)?;
+        let scheme = self.time.integrator;
+        if contact.method == ContactMethod::Constraints && scheme.is_explicit() {
+            let got = format!("\"constraints\" with time.integrator = {}", quoted(&scheme));
+            return Err(self.error("contact.method", CONSTRAINED, got));
+        }
         if !DETECTORS.contains(&contact.detector.as_str()) {
             let got = format!("\"{}\"", contact.detector);
             return Err(self
@@ -192,9 +197,6 @@ impl Scene {
         self.finite(&format!("{key}.position"), &collider.position, "m")?;
         self.check_rotation(collider.rotation.as_ref(), &format!("{key}.rotation"))?;
         self.check_keyframes(&collider.keyframes, &format!("{key}.keyframes"))?;
-        if let Some(friction) = collider.friction {
-            self.not_negative(&format!("{key}.friction"), friction, "")?;
-        }
         Ok(())
     }
 
@@ -256,8 +258,17 @@ impl Scene {
 /// 2¹⁶ sub-steps of one step; a step that still fails is stuck.
 const MAX_HALVINGS: u32 = 16;
 
+/// What contact constraints work with.
+const CONSTRAINED: &str = "\"velocity-filter\", or \"constraints\" with one of the implicit integrators (\"implicit-euler\", \
+                           \"implicit-newton\", \"semi-implicit\")";
+
 /// Names that [`cloth_collision::detector`] takes.
 const DETECTORS: [&str; 2] = ["bvh", "brute"];
+
+/// The name of a choice as a scene file writes it, in quotes.
+fn quoted(value: &impl serde::Serialize) -> String {
+    serde_json::to_value(value).map_or_else(|_| String::new(), |name| name.to_string())
+}
 
 fn with_unit(expected: &str, unit: &str) -> String {
     if unit.is_empty() { expected.into() } else { format!("{expected} [{unit}]") }

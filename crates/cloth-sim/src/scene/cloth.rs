@@ -1,7 +1,7 @@
 //! A piece of cloth: mesh, material, start, pins.
 
-use super::{Keyframe, Rotation};
-use cloth_core::{Bending, CoreError, Material, material::library};
+use super::{Friction, Keyframe, Rotation, StrainLimitSource};
+use cloth_core::{Bending, CoreError, HingeCoupling, Material, material::library};
 use serde::{Deserialize, Serialize};
 
 /// A piece of cloth.
@@ -35,6 +35,17 @@ pub struct Cloth {
     /// Whether it meets itself (if `contact.self` says so too).
     #[serde(default = "yes")]
     pub self_collision: bool,
+    /// Friction of this cloth on colliders that have none of their own: Coulomb's coefficient [-], ≥ 0, or a table with a
+    /// law; by default `contact.friction`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<Friction>,
+    /// Friction of this cloth on itself, as `friction`; by default `contact.self_friction`. On other cloth the smoother of
+    /// the two counts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub self_friction: Option<Friction>,
+    /// Largest strain of its edges: the stretch [-], > 0, or a table; without it edges are not limited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub strain_limit: Option<StrainLimitSource>,
     /// Vertices whose motion is prescribed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<Pin>,
@@ -205,6 +216,9 @@ pub struct FabricChoice {
     /// μ in [0, 1]: share of the friction that a full cycle takes away (`hysteresis`).
     #[serde(default)]
     pub fatigue: f64,
+    /// Whether the elastic part of the law acts across the hinges of a triangle.
+    #[serde(default)]
+    pub hinges: HingeCoupling,
 }
 
 /// Bending law of a library material.
@@ -241,6 +255,7 @@ impl FabricChoice {
         } else if let Some((name, got)) = shares.into_iter().find(|(_, value)| *value != 0.0) {
             return Err(CoreError::Parameter { name, expected: "0 without bending = \"hysteresis\"", got });
         }
+        material.bending = material.bending.with_hinges(self.hinges);
         material.check()?;
         Ok(material)
     }

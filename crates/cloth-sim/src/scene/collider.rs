@@ -1,6 +1,6 @@
 //! A body that moves as prescribed.
 
-use super::{Keyframe, MeshSource, Rotation};
+use super::{Friction, Keyframe, MeshSource, Rotation};
 use cloth_collision::shapes::Shape;
 use serde::{Deserialize, Serialize};
 
@@ -28,9 +28,10 @@ pub struct Collider {
     /// Poses over time; without them it stands still. Not with `sequence`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub keyframes: Vec<Keyframe>,
-    /// Coulomb coefficient of cloth on this collider [-], ≥ 0; by default `contact.friction`.
+    /// Friction of cloth on this collider: Coulomb's coefficient [-], ≥ 0, or a table with a law; by default the cloth's
+    /// `friction`, then `contact.friction`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub friction: Option<f64>,
+    pub friction: Option<Friction>,
 }
 
 /// A simple shape, centred at its origin, axis along +y, and how closely triangles follow it.

@@ -7,6 +7,7 @@ mod check;
 mod cloth;
 mod collider;
 mod file;
+mod friction;
 mod motion;
 mod output;
 mod schema;
@@ -19,10 +20,11 @@ pub use cloth::{
 };
 pub use collider::{Collider, SequenceSource, ShapeSource};
 pub use file::FileReference;
+pub use friction::{Friction, PairFriction, StrainLimitSource, StrainLimitTable};
 pub use motion::{Keyframe, Rotation};
 pub use output::Output;
-pub use source::SceneError;
-pub use world::{Air, Contact, Time, Up};
+pub use source::{SceneError, nearest};
+pub use world::{Air, Contact, ContactMethod, Time, Up};
 
 pub(crate) use bounds::{LENGTH, VELOCITY};
 use cloth_core::SolverParams;

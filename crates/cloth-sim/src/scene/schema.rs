@@ -118,6 +118,13 @@ impl<'a> Checker<'a> {
         node: &Node,
         path: &str,
     ) -> Result<(), SceneError> {
+        // A value that may also be left out.
+        let mut present = variants.iter().filter(|v| v.get("type") != Some(&Json::from("null")));
+        if let (Some(only), None) = (present.next(), present.next())
+            && node.value != Value::Null
+        {
+            return self.check(only, node, path);
+        }
         let Value::Table(entries) = &node.value else {
             // Not a table: the variant that accepts it, else what all of them are.
             let accepts = variants.iter().any(|v| self.check(v, node, path).is_ok());

@@ -66,7 +66,7 @@ impl SceneError {
 }
 
 /// The known name that is fewest edits away, if that is at most a third of its length (at least two edits).
-fn nearest<'a>(got: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+pub fn nearest<'a>(got: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
     known
         .map(|name| (strsim::damerau_levenshtein(got, name), name))
         .min()

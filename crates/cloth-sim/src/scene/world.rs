@@ -1,5 +1,6 @@
 //! What holds for the whole scene: axes, time, air, contact.
 
+use super::{Friction, PairFriction};
 use cloth_core::{IntegratorParams, Method, Psd};
 use serde::{Deserialize, Serialize};
 
@@ -71,10 +72,23 @@ impl Default for Air {
     }
 }
 
+/// How contact with colliders is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContactMethod {
+    /// Impulses after the dynamics (Bridson et al. 2002).
+    #[default]
+    VelocityFilter,
+    /// Constraints in the implicit solve for cloth vertices on colliders (Baraff and Witkin 1998); impulses for the rest.
+    Constraints,
+}
+
 /// Contact of cloth with itself, other cloth and colliders.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Contact {
+    /// How contact with colliders is kept: "velocity-filter", or "constraints" (implicit integrators only).
+    pub method: ContactMethod,
     /// Distance at which surfaces rest on each other [m], > 0.
     pub thickness: f64,
     /// Detection method: "bvh", or "brute" (every pair, the oracle).
@@ -82,10 +96,14 @@ pub struct Contact {
     /// Whether cloth meets itself; a piece of cloth may opt out with its own `self_collision`.
     #[serde(rename = "self")]
     pub self_collision: bool,
-    /// Coulomb coefficient of cloth on colliders [-], ≥ 0; a collider may have its own.
-    pub friction: f64,
-    /// Coulomb coefficient of cloth on cloth [-], ≥ 0.
-    pub self_friction: f64,
+    /// Friction of cloth on colliders: Coulomb's coefficient [-], ≥ 0, or a table with a law; a collider, a piece of cloth or
+    /// a pair may have its own.
+    pub friction: Friction,
+    /// Friction of cloth on cloth, as `friction`; a piece of cloth or a pair may have its own.
+    pub self_friction: Friction,
+    /// Friction of single pairs of bodies, before all other entries.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub pairs: Vec<PairFriction>,
     /// Stiffness of the repulsion of one contact within the thickness [N/m], ≥ 0.
     pub repulsion_stiffness: f64,
     /// Detection passes answered with impulses, ≥ 1.
@@ -100,11 +118,13 @@ impl Default for Contact {
     fn default() -> Self {
         let response = cloth_response::ResponseParams::default();
         Self {
+            method: ContactMethod::default(),
             thickness: response.thickness,
             detector: "bvh".into(),
             self_collision: true,
-            friction: response.friction.default,
-            self_friction: response.friction.self_friction,
+            friction: Friction::Coefficient(0.3),
+            self_friction: Friction::Coefficient(0.2),
+            pairs: Vec::new(),
             repulsion_stiffness: response.repulsion_stiffness,
             max_passes: response.max_passes,
             max_zone_passes: response.max_zone_passes,

@@ -6,7 +6,7 @@
 
 mod fabrics;
 
-use super::{Bending, HysteresisBending, InPlane, Material, NonlinearBending};
+use super::{Bending, HingeCoupling, HysteresisBending, InPlane, Material, NonlinearBending};
 use crate::CoreError;
 use fabrics::{BENDING_DAMPING, FABRICS, IN_PLANE_DAMPING};
 
@@ -120,7 +120,9 @@ impl Fabric {
         let damping = BENDING_DAMPING.value;
         let bending = match law {
             "none" => Bending::None,
-            "linear" => Bending::Hinge { rigidity: self.rigidity.value, damping },
+            "linear" => {
+                Bending::Hinge { rigidity: self.rigidity.value, damping, hinges: HingeCoupling::Coupled }
+            }
             "nonlinear" => Bending::Nonlinear(NonlinearBending {
                 rigidity,
                 coercive_couple,

@@ -1,0 +1,104 @@
+//! What the sweeps ask of friction, and the kernel of a scene whose laws are all Coulomb.
+//!
+//! The kernel is chosen once per step, outside of the loops: a scene that asks for Coulomb runs code that knows nothing else.
+
+use super::into_cone;
+use crate::impulse::Contact;
+use crate::motion::Motion;
+use crate::{FrictionLaw, FrictionRule, Vec3};
+use cloth_collision::CollisionMesh;
+
+/// The friction of all contacts.
+pub(crate) trait Kernel {
+    /// What a contact knows about its friction.
+    type State: Copy + std::fmt::Debug;
+
+    /// A new contact between two bodies, given one vertex of either.
+    fn state(&self, rule: &FrictionRule, mesh: &CollisionMesh, first: u32, second: u32) -> Self::State;
+
+    /// A contact without friction.
+    fn frictionless(&self) -> Self::State;
+
+    /// Whether the contact has friction.
+    fn acts(&self, state: &Self::State) -> bool;
+
+    /// The tangential impulse where `stop` is the one that ends all sliding \[N s\], under the normal impulse λ \[N s\].
+    ///
+    /// `mass`: the contact's effective mass \[kg\].
+    fn bound(&self, state: &mut Self::State, stop: Vec3, lambda: f64, mass: f64) -> Vec3;
+
+    /// Before the sweeps, with all contacts.
+    fn begin(&mut self, contacts: &mut [Contact<Self::State>], vertex_count: usize);
+
+    /// Before sweep number `sweep`.
+    fn before_sweep(&mut self, sweep: usize);
+
+    /// Where the sweeps have settled: what their result changes in the contacts' laws. Calls `again` for each contact that
+    /// has changed.
+    fn settled(
+        &mut self,
+        contacts: &mut [Contact<Self::State>],
+        motion: &Motion<'_>,
+        tolerance: f64,
+        again: impl FnMut(usize),
+    );
+
+    /// Memory \[B\].
+    fn bytes(&self) -> usize;
+}
+
+/// Coulomb: one coefficient per contact.
+#[derive(Debug, Default)]
+pub(crate) struct Coulomb {
+    /// Coefficient of each law of the rule.
+    coefficients: Vec<f64>,
+}
+
+impl Coulomb {
+    pub(crate) fn new(laws: &[FrictionLaw]) -> Self {
+        Self { coefficients: laws.iter().map(FrictionLaw::kinetic_coefficient).collect() }
+    }
+}
+
+impl Kernel for Coulomb {
+    type State = f64;
+
+    #[inline]
+    fn state(&self, rule: &FrictionRule, mesh: &CollisionMesh, first: u32, second: u32) -> f64 {
+        self.coefficients[rule.index_of(mesh, first, second)]
+    }
+
+    fn frictionless(&self) -> f64 {
+        0.0
+    }
+
+    #[inline]
+    fn acts(&self, state: &f64) -> bool {
+        *state > 0.0
+    }
+
+    #[inline]
+    fn bound(&self, state: &mut f64, stop: Vec3, lambda: f64, _mass: f64) -> Vec3 {
+        into_cone(stop, *state * lambda)
+    }
+
+    #[inline]
+    fn begin(&mut self, _contacts: &mut [Contact<f64>], _vertex_count: usize) {}
+
+    #[inline]
+    fn before_sweep(&mut self, _sweep: usize) {}
+
+    #[inline]
+    fn settled(
+        &mut self,
+        _contacts: &mut [Contact<f64>],
+        _motion: &Motion<'_>,
+        _tolerance: f64,
+        _again: impl FnMut(usize),
+    ) {
+    }
+
+    fn bytes(&self) -> usize {
+        crate::motion::bytes_of(&self.coefficients)
+    }
+}

@@ -1,0 +1,207 @@
+//! The stages of one step's response, in reading order.
+
+use crate::collisions::{APPROACH, Detection, Hit, look_again, unresolved};
+use crate::frames::Frames;
+use crate::friction::kernel::Kernel;
+use crate::hold::hold_back;
+use crate::landing::Landing;
+use crate::motion::{Motion, bytes_of};
+use crate::repulsion::{self, BAND};
+use crate::strain::limiter::Limiter;
+use crate::sweeps::ContactSet;
+use crate::zones::{Zones, move_zones};
+use crate::{ResponseError, ResponseInfo, ResponseParams, Vec3};
+use cloth_collision::{CollisionMesh, StencilKind};
+use std::collections::HashSet;
+use std::time::Instant;
+
+/// Cap on the times that strain limits are made anew within one pass.
+const MAX_STRAIN_PASSES: usize = 40;
+/// Cap on the rounds of passes, zones and holding back, where these leave a strain limit broken.
+const MAX_ROUNDS: usize = 4;
+
+/// What the stages keep from step to step: buffers, and what was declared.
+#[derive(Default)]
+pub(crate) struct Stages {
+    /// Undeformed positions, or empty.
+    pub(crate) rest_x: Vec<Vec3>,
+    pub(crate) limiter: Limiter,
+    landing: Landing,
+    frames: Frames,
+    zones: Zones,
+    hits: Vec<Hit>,
+    /// Contacts on sides and corners that are in the set already.
+    shared: HashSet<[u32; 4]>,
+}
+
+impl Stages {
+    pub(crate) fn new(mesh: &CollisionMesh) -> Self {
+        Self { landing: Landing::new(mesh), ..Self::default() }
+    }
+
+    /// Memory [B].
+    pub(crate) fn bytes(&self) -> usize {
+        // A hash set's slots: one byte of control each.
+        let slots = self.shared.capacity() * (size_of::<[u32; 4]>() + 1);
+        bytes_of(&self.rest_x)
+            + self.limiter.bytes()
+            + self.landing.bytes()
+            + self.frames.bytes()
+            + self.zones.bytes()
+            + bytes_of(&self.hits)
+            + slots
+    }
+
+    /// Changes the motion so that it has no known collision and keeps the strain limits.
+    pub(crate) fn run<K: Kernel>(
+        &mut self,
+        params: &ResponseParams,
+        contacts: &mut ContactSet<K>,
+        detection: &mut Detection<'_>,
+        motion: &mut Motion<'_>,
+    ) -> Result<ResponseInfo, ResponseError> {
+        let Self { rest_x, limiter, landing, frames, zones, hits, shared } = self;
+        let (mesh, x_t0) = (detection.mesh, motion.x_t0);
+        let mut info = ResponseInfo::default();
+        let mut clock = Clock(Instant::now());
+        frames.clear(mesh.bodies.len());
+        contacts.clear();
+        limiter.begin();
+        hits.clear();
+
+        // 1. Near pairs at the start: resting contact and repulsion.
+        let near = detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, None, detection.pool)?;
+        info.proximities = near.len();
+        clock.lap(&mut info, "proximity");
+        shared.clear();
+        landing.follow(&near, mesh, &motion.buffers.end, |pair| {
+            if let Some(contact) = repulsion::contact(&pair, mesh, params, rest_x, motion, &contacts.kernel)
+                && contact.shared_feature().is_none_or(|key| shared.insert(key))
+            {
+                contacts.push(contact);
+            }
+        });
+        settle(contacts, limiter, motion, params, &mut info);
+        clock.lap(&mut info, "impulses");
+
+        // 2. Collisions during the step, answered by impulses; the first look is at all pairs.
+        let mut exempt = HashSet::new();
+        let mut judge = |hits: &mut Vec<Hit>| {
+            if params.allow_initial_contacts {
+                hits.retain(|hit| {
+                    let out = hit.touches_at_start(x_t0);
+                    if out {
+                        exempt.insert(hit.key());
+                    }
+                    !out
+                });
+            }
+        };
+        detection.hits(motion, APPROACH * params.thickness, false, hits)?;
+        motion.clear_changed();
+        info.passes = 1;
+        judge(hits);
+        info.collisions = hits.len();
+        clock.lap(&mut info, "detection");
+        let mut answered: HashSet<(StencilKind, [u32; 2])> = HashSet::new();
+        for round in 1.. {
+            let most = info.passes + params.max_passes - 1;
+            while !hits.is_empty() && info.passes < most {
+                for hit in hits.iter() {
+                    answered.insert(hit.key());
+                    if let Some(contact) = hit.contact(mesh, params, rest_x, motion, &contacts.kernel) {
+                        contacts.push(contact);
+                    }
+                }
+                let moved = settle(contacts, limiter, motion, params, &mut info);
+                clock.lap(&mut info, "impulses");
+                if moved == 0 {
+                    break;
+                }
+                info.passes += 1;
+                look_again(detection, motion, APPROACH * params.thickness, hits)?;
+                judge(hits);
+                // A pair that was pushed apart and only comes near is no collision.
+                hits.retain(|hit| !answered.contains(&hit.key()) || hit.collides(x_t0, &motion.buffers.end));
+                clock.lap(&mut info, "detection");
+            }
+            hits.retain(|hit| hit.collides(x_t0, &motion.buffers.end));
+            contacts.count(motion, params.velocity_tolerance, &mut info);
+
+            // 3. Rigid impact zones.
+            if !hits.is_empty() && params.max_zone_passes > 0 {
+                move_zones(zones, detection, motion, frames, params, hits, &mut info, &mut judge)?;
+                clock.lap(&mut info, "zones");
+            }
+
+            // 4. What still collides is held back.
+            if !hits.is_empty() {
+                hold_back(detection, motion, frames, params.thickness, hits, &mut info, &mut judge)?;
+                clock.lap(&mut info, "hold");
+            }
+
+            // 5. Every pair has been seen free of collision on the motion that it has now, or is exempt.
+            if !hits.is_empty() {
+                return Err(unresolved(hits));
+            }
+            if limiter.is_off() {
+                break;
+            }
+            // 6. Every limited edge is inside of its limit, or all is done again.
+            let (edges, excess) = limiter.beyond(motion);
+            if edges.is_empty() {
+                limiter.measure(contacts, motion, &mut info);
+                break;
+            }
+            if round == MAX_ROUNDS {
+                return Err(ResponseError::Strained { edges, excess });
+            }
+            settle(contacts, limiter, motion, params, &mut info);
+            info.passes += 1;
+            look_again(detection, motion, APPROACH * params.thickness, hits)?;
+            judge(hits);
+            clock.lap(&mut info, "strain");
+        }
+        info.exempt = exempt.len();
+        Ok(info)
+    }
+}
+
+/// Relaxes the contacts, and the strain limits with them until all are kept; the number of vertices whose ends moved.
+fn settle<K: Kernel>(
+    contacts: &mut ContactSet<K>,
+    limiter: &mut Limiter,
+    motion: &mut Motion<'_>,
+    params: &ResponseParams,
+    info: &mut ResponseInfo,
+) -> usize {
+    if !limiter.is_off() {
+        limiter.linearise(contacts, motion);
+    }
+    let mut moved = 0;
+    for _ in 0..MAX_STRAIN_PASSES {
+        let sweeps = contacts.relax(motion, params.velocity_tolerance, params.max_sweeps);
+        info.sweeps += sweeps.sweeps;
+        info.residual = sweeps.residual;
+        moved += motion.write_ends();
+        if limiter.is_off() {
+            break;
+        }
+        info.strain_passes += 1;
+        if limiter.linearise(contacts, motion) {
+            break;
+        }
+    }
+    moved
+}
+
+struct Clock(Instant);
+
+impl Clock {
+    /// Books the time since the last lap on a stage.
+    fn lap(&mut self, info: &mut ResponseInfo, stage: &'static str) {
+        let now = Instant::now();
+        info.add_seconds(stage, (now - self.0).as_secs_f64());
+        self.0 = now;
+    }
+}
