@@ -36,13 +36,14 @@ pub(crate) fn device(options: GpuOptions) -> Option<Device> {
     }
 }
 
-/// With subgroup operations, without, and with every dispatch folded to two dimensions.
-pub(crate) fn variants() -> [GpuOptions; 3] {
+/// With subgroup operations, without, with every dispatch folded to two dimensions, and without wgpu's guards.
+pub(crate) fn variants() -> [GpuOptions; 4] {
     let plain = GpuOptions::default();
     [
         plain,
         GpuOptions { subgroups: false, ..plain },
         GpuOptions { max_workgroups_per_dimension: Some(24), ..plain },
+        GpuOptions { shader_checks: false, ..plain },
     ]
 }
 
