@@ -16,10 +16,11 @@ ALLOWED: dict[str, set[str]] = {
     "cloth-mesh": set(),
     "cloth-core": {"cloth-mesh"},
     "cloth-collision": {"cloth-mesh"},
+    "cloth-gpu": {"cloth-collision"},
     "cloth-response": {"cloth-collision"},
     "cloth-sim": {"cloth-core", "cloth-collision", "cloth-response"},
     "cloth-py": {"cloth-sim"},
-    "cloth-benches": {"cloth-mesh", "cloth-core", "cloth-collision", "cloth-response", "cloth-sim"},
+    "cloth-benches": {"cloth-mesh", "cloth-core", "cloth-collision", "cloth-gpu", "cloth-response", "cloth-sim"},
 }
 
 # Libraries that only the named crates may know.

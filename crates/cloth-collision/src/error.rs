@@ -79,6 +79,14 @@ pub enum DetectError {
         /// Triangles of the mesh that came.
         got: usize,
     },
+    /// A detector that works on another device got no answer from it.
+    #[error("detector \"{detector}\": {reason}")]
+    Device {
+        /// Name of the detector.
+        detector: &'static str,
+        /// What the device says.
+        reason: String,
+    },
     /// No detector has this name.
     #[error("detector: expected one of {known}, got \"{got}\"")]
     UnknownDetector {

@@ -30,6 +30,7 @@ mod contact;
 mod detector;
 mod error;
 mod intersect;
+mod narrow;
 mod stencil;
 
 pub use brute::BruteForce;
@@ -40,6 +41,7 @@ pub use contact::{Contacts, DetectStats, Mode, Query};
 pub use detector::{Detector, detector};
 pub use error::DetectError;
 pub use intersect::{intersections, self_intersections};
+pub use narrow::NarrowPhase;
 pub use stencil::{Stencil, StencilKind, stencil_at_contact_edge_edge, stencil_at_contact_vertex_triangle};
 
 /// A point [m] in space.

@@ -8,11 +8,11 @@ use crate::bounds::{Compare, LANES, Plain, lanes};
 
 /// Candidates of one task, waiting for the narrow phase.
 #[derive(Debug, Default)]
-pub(super) struct Candidates {
+pub(crate) struct Candidates {
     /// (vertex, triangle)
-    pub(super) vertex_triangle: Vec<[u32; 2]>,
+    pub(crate) vertex_triangle: Vec<[u32; 2]>,
     /// (edge, edge), unordered
-    pub(super) edge_edge: Vec<[u32; 2]>,
+    pub(crate) edge_edge: Vec<[u32; 2]>,
 }
 
 /// Pairs of triangles of one task, waiting for the exact test. A triangle is named by its place in the leaves: leaf times

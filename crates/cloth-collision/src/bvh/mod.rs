@@ -7,10 +7,10 @@
 mod build;
 mod intersections;
 mod leaf_pair;
-mod narrow;
+pub(crate) mod narrow;
 mod proximity;
 mod refit;
-mod traverse;
+pub(crate) mod traverse;
 mod validate;
 
 use crate::bounds::LANES;

@@ -15,14 +15,14 @@ use cloth_mesh::NONE;
 struct Motion([Row; 2]);
 
 /// What the narrow phase knows of a query.
-pub(super) struct Scene<'a> {
+pub(crate) struct Scene<'a> {
     mesh: &'a CollisionMesh,
     query: &'a Query<'a>,
     motion: Vec<Motion>,
 }
 
 impl<'a> Scene<'a> {
-    pub(super) fn new(mesh: &'a CollisionMesh, query: &'a Query<'a>) -> Self {
+    pub(crate) fn new(mesh: &'a CollisionMesh, query: &'a Query<'a>) -> Self {
         let start = if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 };
         Self {
             mesh,
@@ -53,7 +53,7 @@ impl<'a> Scene<'a> {
 type Pair = ([u32; 2], [u32; 4]);
 
 /// The contacts of one task.
-pub(super) struct Narrow<'a> {
+pub(crate) struct Narrow<'a> {
     scene: &'a Scene<'a>,
     waiting: Vec<Pair>,
     left: Vec<Pair>,
@@ -65,7 +65,7 @@ pub(super) struct Narrow<'a> {
 }
 
 impl<'a> Narrow<'a> {
-    pub(super) fn new(scene: &'a Scene<'a>) -> Self {
+    pub(crate) fn new(scene: &'a Scene<'a>) -> Self {
         Self {
             scene,
             waiting: vec![],
@@ -138,7 +138,7 @@ impl Sink for Narrow<'_> {
 }
 
 /// All contacts, sorted. Each pair comes from one task only.
-pub(super) fn merge<'a>(sinks: impl Iterator<Item = Narrow<'a>>) -> Contacts {
+pub(crate) fn merge<'a>(sinks: impl Iterator<Item = Narrow<'a>>) -> Contacts {
     let mut out = Contacts::default();
     let (mut vertex_triangle, mut edge_edge) = (vec![], vec![]);
     for sink in sinks {

@@ -9,7 +9,7 @@ use crate::bounds::avx::Avx2;
 use crate::bounds::{Compare, LANES, Plain, lanes};
 use rayon::prelude::*;
 
-pub(super) use leaf_pair::Candidates;
+pub(crate) use leaf_pair::Candidates;
 
 /// The traversal is cut into about so many tasks where it can be; fixed, so that nothing depends on the number of
 /// threads.
@@ -40,7 +40,7 @@ pub(super) struct LeafPairs<'a, const ENDS: usize> {
 }
 
 /// What is done with candidates.
-pub(super) trait Sink: Send {
+pub(crate) trait Sink: Send {
     /// Takes the waiting candidates out.
     fn take(&mut self, candidates: &mut Candidates);
 }

@@ -1,0 +1,10 @@
+//! One wrapper per stage: it records the stage's kernels into a submission.
+
+pub mod bounds;
+pub mod cells;
+pub mod compact;
+pub mod features;
+pub mod pairs;
+pub mod scan;
+pub mod sort;
+pub mod subdivision;

@@ -1,0 +1,85 @@
+//! The published scenes: the contacts of the grid are those of the tree on the CPU.
+#![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
+#![allow(clippy::print_stderr, clippy::print_stdout, reason = "a skipped test says so, a run its times")]
+
+mod support;
+
+use cloth_gpu::collision::{Bvh, CollisionMesh, Detector, Mode, Query, Vec3};
+use cloth_gpu::{GpuOptions, GridGpu};
+use std::time::Instant;
+use support::{device, difference, npz, pool};
+
+struct Scene {
+    x_t0: Vec<Vec3>,
+    x_t1: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// A scene of `../shared/data/ccd` beside the repository; None, with the reason, if it is not there.
+fn scene(name: &str) -> Option<Scene> {
+    let path = format!("{}/../../../shared/data/ccd/{name}.npz", env!("CARGO_MANIFEST_DIR"));
+    let Ok(archive) = std::fs::read(&path) else {
+        eprintln!("skipped: no file {path}");
+        return None;
+    };
+    let positions = |member: &str| {
+        let rows = npz::rows(&npz::array(&archive, member).unwrap(), f64::from_le_bytes);
+        rows.into_iter().map(Vec3::from).collect()
+    };
+    let triangles = npz::rows(&npz::array(&archive, "F.npy").unwrap(), u32::from_le_bytes);
+    Some(Scene { x_t0: positions("V0.npy"), x_t1: positions("V1.npy"), triangles })
+}
+
+fn agrees(method: &str, name: &str, modes: &[Mode], turns: &[&str]) {
+    let Some(device) = device(GpuOptions::default()) else { return };
+    let Some(Scene { x_t0, x_t1, triangles }) = scene(name) else { return };
+    let pool = pool(2);
+    let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+    let mut bvh = Bvh::new(&mesh, &x_t0).unwrap();
+    let mut grid = match method {
+        "grid" => GridGpu::new(device.gpu.clone(), &mesh).unwrap(),
+        _ => GridGpu::virtual_subdivision(device.gpu.clone(), &mesh).unwrap(),
+    };
+    for &mode in modes {
+        let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode, active: None };
+        let expected = bvh.detect(&mesh, &query, &pool).unwrap();
+        for turn in turns {
+            let clock = Instant::now();
+            let got = grid.detect(&mesh, &query, &pool).unwrap();
+            println!(
+                "{method}, {name}, {mode:?}, {turn}: {:.2} s, {} parts, {} registrations, {} MiB, {:?}",
+                clock.elapsed().as_secs_f64(),
+                grid.parts(),
+                grid.registrations(),
+                grid.bytes() >> 20,
+                got.stats
+            );
+            assert_eq!(difference(&expected, &got), None, "{method}, {name}, {mode:?}, {turn}");
+        }
+        assert!(!expected.edge_edge.is_empty() || mode == Mode::Discrete);
+    }
+}
+
+#[test]
+fn cloth_ball_agrees() {
+    agrees("grid", "cloth-ball", &[Mode::Continuous], &["first"]);
+}
+
+#[test]
+fn funnel_agrees() {
+    agrees("grid", "cloth-funnel", &[Mode::Continuous, Mode::Discrete], &["first"]);
+}
+
+#[test]
+#[ignore = "slow on a software adapter: run with --ignored"]
+fn n_body_agrees() {
+    agrees("grid", "n-body-simulation", &[Mode::Continuous], &["first"]);
+}
+
+#[test]
+fn subdivision_agrees_on_all() {
+    let both = [Mode::Continuous, Mode::Discrete];
+    for name in ["cloth-ball", "cloth-funnel", "n-body-simulation"] {
+        agrees("virtual-subdivision", name, &both, &["first"]);
+    }
+}
