@@ -18,7 +18,7 @@ ALLOWED: dict[str, set[str]] = {
     "cloth-collision": {"cloth-mesh"},
     "cloth-gpu": {"cloth-collision"},
     "cloth-response": {"cloth-collision"},
-    "cloth-sim": {"cloth-core", "cloth-collision", "cloth-response"},
+    "cloth-sim": {"cloth-core", "cloth-collision", "cloth-gpu", "cloth-response"},
     "cloth-py": {"cloth-sim"},
     "cloth-benches": {"cloth-mesh", "cloth-core", "cloth-collision", "cloth-gpu", "cloth-response", "cloth-sim"},
 }

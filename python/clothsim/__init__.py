@@ -18,6 +18,7 @@ from clothsim._core import __version__
 from clothsim.errors import (
     CheckpointError,
     ClothSimError,
+    DeviceError,
     GpuUnavailable,
     IntersectingStart,
     InvalidInput,
@@ -41,6 +42,7 @@ __all__ = [
     "Body",
     "CheckpointError",
     "ClothSimError",
+    "DeviceError",
     "Fabric",
     "Frame",
     "GpuUnavailable",

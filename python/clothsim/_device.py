@@ -12,11 +12,11 @@ _MOST_THREADS = 65_536
 
 
 def check_device(device: str) -> str:
-    """Return ``"cpu"`` for what this build can do; ``"auto"`` is the CPU too, as it is the only one."""
+    """Return ``"cpu"`` for what a simulation can do; ``"auto"`` is the CPU too, as it is the only one."""
     if device in ("cpu", "auto"):
         return "cpu"
     if device == "gpu":
-        raise GpuUnavailable('device: this build detects collisions on the CPU only; use "cpu" or "auto"')
+        raise GpuUnavailable('device: a simulation detects collisions on the CPU only; use "cpu" or "auto"')
     raise InvalidInput(
         f'device: expected one of "cpu", "auto", got {device!r}',
         name="device",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -9,12 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from clothsim import _core
 from clothsim._arrays import Floats, Ints, floats, indices, number
-from clothsim._device import check_device, check_threads
+from clothsim._device import check_threads
 
 __all__ = ["Detection", "detect", "edge_edge_ccd", "self_intersections", "vertex_triangle_ccd"]
 
-Method = Literal["brute", "bvh"]
+Method = Literal["brute", "bvh", "grid", "virtual-subdivision", "auto"]
 Mode = Literal["continuous", "discrete"]
+
+_logger = logging.getLogger(__name__)
 
 _THICKNESS = "a finite length ≥ 0 m"
 
@@ -34,7 +37,8 @@ class Detection:
     time_edge_edge : (k,) float64
         As above.
     stats : dict
-        Counts (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage.
+        ``method`` and ``device`` that found them (``"cpu"``, or the GPU with its driver), counts
+        (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage.
     """
 
     vertex_triangle: Ints
@@ -60,7 +64,7 @@ def detect(
     """Find every vertex-triangle and edge-edge pair that shares no vertex and comes within ``thickness``.
 
     Vertices move in straight lines from ``x_t0`` to ``x_t1``. No pair is missed: what cannot be decided counts as a
-    contact. The result has the same bits for any number of threads.
+    contact. The result has the same bits for any method, any device and any number of threads.
 
     Parameters
     ----------
@@ -68,14 +72,18 @@ def detect(
         Positions at both ends of the step [m].
     triangles : (m, 3) array of int32 or int64
         Vertex indices.
-    method : {"bvh", "brute"}
-        ``"bvh"``: a tree of boxes. ``"brute"``: every pair, the oracle; for small meshes.
+    method : {"bvh", "brute", "grid", "virtual-subdivision", "auto"}
+        On the CPU: ``"bvh"``, a tree of boxes; ``"brute"``, every pair, the oracle, for small meshes. On a GPU:
+        ``"grid"``, a uniform grid; ``"virtual-subdivision"``, a finer one in which large triangles count in parts.
+        ``"auto"``: ``"bvh"`` on the CPU, ``"virtual-subdivision"`` on a GPU.
     mode : {"continuous", "discrete"}
         The motion, or the end positions ``x_t1`` alone.
     thickness : float
         Distance up to which two features are in contact [m], ≥ 0.
-    device : {"cpu", "auto"}
-        Where to compute.
+    device : {"cpu", "gpu", "auto"}
+        Where to compute. ``"gpu"``: any Vulkan, Metal or DX12 adapter, a software adapter too; opened once per process.
+        ``"auto"``: a GPU that is no software adapter, for ``"auto"`` and the GPU's methods; without one, or if it
+        fails, ``"bvh"`` on the CPU, with the reason in the log (logger ``clothsim.collision``).
     threads : int, optional
         How many threads; all of the machine's by default.
 
@@ -88,7 +96,9 @@ def detect(
     InvalidInput
         An argument is not what it should be.
     GpuUnavailable
-        ``device="gpu"``: this build detects on the CPU only.
+        ``device="gpu"``, and there is no adapter.
+    DeviceError
+        ``device="gpu"``, and it gave no answer.
 
     Examples
     --------
@@ -103,18 +113,20 @@ def detect(
     >>> round(float(d.time_vertex_triangle[0]), 6)
     0.5
     """
-    check_device(device)
-    return Detection(
-        *_core.detect(
-            floats(x_t0, "x_t0", "shape (n, 3)"),
-            floats(x_t1, "x_t1", "shape (n, 3)"),
-            indices(triangles, "triangles"),
-            str(method),
-            str(mode),
-            number(thickness, "thickness", _THICKNESS),
-            check_threads(threads),
-        )
+    vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge, stats, fallback = _core.detect(
+        floats(x_t0, "x_t0", "shape (n, 3)"),
+        floats(x_t1, "x_t1", "shape (n, 3)"),
+        indices(triangles, "triangles"),
+        str(method),
+        str(mode),
+        number(thickness, "thickness", _THICKNESS),
+        str(device),
+        check_threads(threads),
     )
+    if fallback is not None:
+        has_failed, reason = fallback
+        _logger.log(logging.WARNING if has_failed else logging.INFO, "on the CPU instead of a GPU: %s", reason)
+    return Detection(vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge, stats)
 
 
 def vertex_triangle_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDArray[Any], Floats]:

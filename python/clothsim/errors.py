@@ -11,6 +11,7 @@ from collections.abc import Sequence
 __all__ = [
     "CheckpointError",
     "ClothSimError",
+    "DeviceError",
     "GpuUnavailable",
     "IntersectingStart",
     "InvalidInput",
@@ -200,7 +201,21 @@ class CheckpointError(ClothSimError, ValueError):
     """A checkpoint is damaged, or belongs to another version."""
 
 
-class GpuUnavailable(ClothSimError, RuntimeError):
+class DeviceError(ClothSimError, RuntimeError):
+    """A GPU gave no answer: lost, hung, or out of memory. The next call opens it anew.
+
+    Attributes
+    ----------
+    device : str
+        The adapter with its driver.
+    """
+
+    def __init__(self, message: str, *, device: str = "") -> None:
+        super().__init__(message)
+        self.device = device
+
+
+class GpuUnavailable(DeviceError):
     """A GPU was asked for, and there is none that can be used."""
 
 

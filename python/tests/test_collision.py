@@ -66,13 +66,21 @@ def test_input_is_borrowed_not_changed() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"method": "grid"}, 'method: expected one of "brute", "bvh", got "grid"'),
-        ({"method": "virtual-subdivision"}, 'method: expected one of "brute", "bvh"'),
+        (
+            {"method": "grid"},
+            r'method: expected one that runs on device "cpu" \("brute", "bvh" run on "cpu", '
+            r'"grid", "virtual-subdivision" on "gpu"\), '
+            'got "grid"',
+        ),
+        ({"method": "virtual-subdivision"}, 'that runs on device "cpu"'),
+        ({"method": "bvh", "device": "gpu"}, 'that runs on device "gpu"'),
+        ({"method": "gird"}, '"grid", "virtual-subdivision", "auto", got "gird" .did you mean "grid"'),
+        ({"method": "octopus"}, '"auto", got "octopus"$'),
         ({"mode": "swept"}, 'mode: expected one of "continuous", "discrete", got "swept"'),
         ({"thickness": -1e-3}, "thickness: expected a finite length ≥ 0 m, got -0.001"),
         ({"thickness": float("nan")}, "thickness: .*NaN"),
         ({"threads": 0}, "threads: expected a whole number ≥ 1, got 0"),
-        ({"device": "tpu"}, 'device: expected one of "cpu", "auto"'),
+        ({"device": "tpu"}, 'device: expected one of "cpu", "gpu", "auto", got "tpu"'),
         ({"x_t1": np.zeros((5, 3))}, "x_t1: expected 81 entries, got 5"),
         ({"x_t0": np.zeros((81, 2))}, r"x_t0: expected shape \(n, 3\) and float64, got shape \(81, 2\), float64"),
         ({"x_t1": np.full((81, 3), np.inf)}, "x_t1: expected finite coordinates"),
@@ -85,12 +93,6 @@ def test_bad_arguments(change: dict[str, Any], message: str) -> None:
     x_t0, x_t1, triangles = crumpled()
     with pytest.raises(cs.InvalidInput, match=message):
         cs.collision.detect(**{"x_t0": x_t0, "x_t1": x_t1, "triangles": triangles, **change})
-
-
-def test_a_gpu_is_asked_for_in_vain() -> None:
-    x_t0, x_t1, triangles = crumpled()
-    with pytest.raises(cs.GpuUnavailable, match="CPU only"):
-        cs.collision.detect(x_t0, x_t1, triangles, device="gpu")
 
 
 STILL = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]

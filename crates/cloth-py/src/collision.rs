@@ -1,30 +1,35 @@
 //! Detection alone: `clothsim.collision`.
 
 use cloth_sim::collision::mesh::Vec3;
-use cloth_sim::collision::{self, CollisionMesh, Contacts, DetectStats, Mode, Query};
+use cloth_sim::collision::{self, CollisionMesh, Contacts, Mode, Query};
+use cloth_sim::device::{self, Detected, Device, DeviceError, Reason};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::convert::{indices_to_numpy, queries_from, triangles_from, vertices_from};
 use crate::detach::{detached, pool};
-use crate::errors::{detect_error, invalid_input};
+use crate::errors::{detect_error, device_error, invalid_input};
 
 /// `(hit, time)`, both of length n.
 type Answers<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);
 
-/// `(vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge, stats)`.
-type Detected<'py> = (
+/// Whether a GPU failed, and why the CPU was taken.
+type Fallback = Option<(bool, String)>;
+
+/// `(vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge, stats, fallback)`.
+type Answer<'py> = (
     Bound<'py, PyArray2<i64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray2<i64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyDict>,
+    Fallback,
 );
 
 /// All pairs in contact between two frames of one mesh; edges come back as their two vertices.
 #[pyfunction]
-#[pyo3(signature = (x_t0, x_t1, triangles, method, mode, thickness, threads))]
+#[pyo3(signature = (x_t0, x_t1, triangles, method, mode, thickness, device, threads))]
 pub(crate) fn detect<'py>(
     py: Python<'py>,
     x_t0: &Bound<'py, PyAny>,
@@ -33,8 +38,10 @@ pub(crate) fn detect<'py>(
     method: &str,
     mode: &str,
     thickness: f64,
+    device: &str,
     threads: Option<usize>,
-) -> PyResult<Detected<'py>> {
+) -> PyResult<Answer<'py>> {
+    let device: Device = device.parse().map_err(|error| device_error(py, &error))?;
     let mode = match mode {
         "continuous" => Mode::Continuous,
         "discrete" => Mode::Discrete,
@@ -50,12 +57,17 @@ pub(crate) fn detect<'py>(
     let work = || {
         let mesh = CollisionMesh::single(x_t0.len(), &triangles)?;
         let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
-        query.check(&mesh)?;
-        let contacts = collision::detector(method, &mesh, &x_t0)?.detect(&mesh, &query, &pool)?;
-        Ok((mesh, contacts))
+        let detected = device::detect(&mesh, &query, method, device, &pool)?;
+        Ok::<_, DeviceError>((mesh, detected))
     };
-    let (mesh, contacts) = detached(py, work, detect_error)?;
-    let Contacts { vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge, stats } = contacts;
+    let (mesh, detected) = detached(py, work, device_error)?;
+    let stats = stats_to_dict(py, &detected)?;
+    let Detected { contacts, reason, .. } = detected;
+    let Contacts { vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge, .. } = contacts;
+    let fallback = reason.map(|reason| match reason {
+        Reason::NoGpu(why) => (false, why),
+        Reason::Failed(why) => (true, why),
+    });
     let edge_vertices = edge_edge.iter().map(|&[a, b]| {
         let (a, b) = (mesh.edges[a as usize], mesh.edges[b as usize]);
         [a[0], a[1], b[0], b[1]]
@@ -65,12 +77,16 @@ pub(crate) fn detect<'py>(
         time_vertex_triangle.into_pyarray(py),
         indices_to_numpy(py, edge_vertices),
         time_edge_edge.into_pyarray(py),
-        stats_to_dict(py, &stats)?,
+        stats,
+        fallback,
     ))
 }
 
-fn stats_to_dict<'py>(py: Python<'py>, stats: &DetectStats) -> PyResult<Bound<'py, PyDict>> {
+fn stats_to_dict<'py>(py: Python<'py>, detected: &Detected) -> PyResult<Bound<'py, PyDict>> {
+    let stats = &detected.contacts.stats;
     let dict = PyDict::new(py);
+    dict.set_item("device", &detected.device)?;
+    dict.set_item("method", detected.method)?;
     dict.set_item("broad_phase_tests", stats.broad_phase_tests)?;
     dict.set_item("leaf_pairs", stats.leaf_pairs)?;
     dict.set_item("candidates_vertex_triangle", stats.candidates_vertex_triangle)?;

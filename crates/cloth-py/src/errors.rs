@@ -7,6 +7,7 @@
 use cloth_sim::collision::DetectError;
 use cloth_sim::core::CoreError;
 use cloth_sim::core::mesh::MeshError;
+use cloth_sim::device::DeviceError;
 use cloth_sim::{SceneError, SimError};
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -68,7 +69,7 @@ pub(crate) fn mesh_error(py: Python<'_>, error: &MeshError) -> PyErr {
     })
 }
 
-/// A query that detection refuses: all of them are about arguments.
+/// A query that detection refuses: about arguments, except for a device that fails.
 pub(crate) fn detect_error(py: Python<'_>, error: &DetectError) -> PyErr {
     match error {
         DetectError::UnknownDetector { known, got } => {
@@ -80,17 +81,38 @@ pub(crate) fn detect_error(py: Python<'_>, error: &DetectError) -> PyErr {
         DetectError::Parameter { parameter, expected, got } => {
             invalid_input(py, parameter, expected, &got.to_string())
         }
+        DetectError::Device { .. } => exception(py, "DeviceError", &error.to_string(), |_| Ok(())),
         DetectError::NotFinite { .. }
         | DetectError::IndexOutOfRange { .. }
         | DetectError::RepeatedVertex { .. }
         | DetectError::TooLarge { .. }
-        | DetectError::OtherMesh { .. }
-        | DetectError::Device { .. } => {
+        | DetectError::OtherMesh { .. } => {
             let message = error.to_string();
             exception(py, "InvalidInput", &message, |attributes| {
                 attributes.set_item("name", message.split(':').next())
             })
         }
+    }
+}
+
+/// `GpuUnavailable` and `DeviceError` for the device; the rest is about arguments.
+pub(crate) fn device_error(py: Python<'_>, error: &DeviceError) -> PyErr {
+    match error {
+        DeviceError::Unknown { parameter, expected, got, nearest } => {
+            let hint =
+                nearest.as_ref().map(|name| format!(" (did you mean \"{name}\"?)")).unwrap_or_default();
+            invalid_input(py, parameter, expected, &format!("\"{got}\"{hint}"))
+        }
+        DeviceError::WrongDevice { method, expected } => {
+            invalid_input(py, "method", expected, &format!("\"{method}\""))
+        }
+        DeviceError::Unavailable { .. } => exception(py, "GpuUnavailable", &error.to_string(), |_| Ok(())),
+        DeviceError::Failed { device, .. } => {
+            exception(py, "DeviceError", &error.to_string(), |attributes| {
+                attributes.set_item("device", device)
+            })
+        }
+        DeviceError::Query(inner) => detect_error(py, inner),
     }
 }
 

@@ -11,8 +11,11 @@
 
 pub use cloth_collision as collision;
 pub use cloth_core as core;
+#[cfg(feature = "gpu")]
+pub use cloth_gpu as gpu;
 pub use cloth_response as response;
 
+pub mod device;
 pub mod friction;
 pub mod scene;
 

@@ -1,0 +1,215 @@
+//! Detection by name of the method and of the device: the methods of `cloth-collision` on the CPU, those of `cloth-gpu` on a GPU.
+
+use crate::collision::mesh::Vec3;
+use crate::collision::{self, CollisionMesh, Contacts, DetectError, Query};
+use crate::scene::nearest;
+
+#[cfg(feature = "gpu")]
+mod shared;
+#[cfg(feature = "gpu")]
+pub use shared::SharedGpu;
+
+/// Methods that run on the CPU.
+pub const CPU_METHODS: [&str; 2] = ["brute", "bvh"];
+/// Methods that run on a GPU.
+pub const GPU_METHODS: [&str; 2] = ["grid", "virtual-subdivision"];
+/// The method of `"auto"` on the CPU, and of a GPU's method where there is no GPU.
+const CPU_DEFAULT: &str = "bvh";
+/// The method of `"auto"` on a GPU.
+const GPU_DEFAULT: &str = "virtual-subdivision";
+const DEVICES: [&str; 3] = ["cpu", "gpu", "auto"];
+
+/// Where to detect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Device {
+    /// The CPU.
+    Cpu,
+    /// A GPU, be it a software adapter.
+    Gpu,
+    /// A GPU that is no software adapter, for `"auto"` and for methods that run on one; else the CPU.
+    Auto,
+}
+
+impl std::str::FromStr for Device {
+    type Err = DeviceError;
+
+    fn from_str(name: &str) -> Result<Self, DeviceError> {
+        match name {
+            "cpu" => Ok(Self::Cpu),
+            "gpu" => Ok(Self::Gpu),
+            "auto" => Ok(Self::Auto),
+            _ => Err(unknown("device", name, &DEVICES)),
+        }
+    }
+}
+
+/// The contacts, who found them, and why not somebody else.
+#[derive(Debug)]
+pub struct Detected {
+    /// The contacts; the same for every method on every device.
+    pub contacts: Contacts,
+    /// Name of the method.
+    pub method: &'static str,
+    /// `"cpu"`, or the adapter with its driver.
+    pub device: String,
+    /// Why the CPU, where a GPU would have been taken.
+    pub reason: Option<Reason>,
+}
+
+/// Why [`Device::Auto`] took the CPU.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Reason {
+    /// There is no GPU: nothing is wrong.
+    NoGpu(String),
+    /// There is one, and it failed at this call.
+    Failed(String),
+}
+
+/// Why there are no contacts.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DeviceError {
+    /// No method or device has this name.
+    #[error("{parameter}: expected {expected}, got \"{got}\"{}", did_you_mean(nearest.as_deref()))]
+    Unknown {
+        /// `"method"` or `"device"`.
+        parameter: &'static str,
+        /// The names that exist.
+        expected: String,
+        /// The name that came.
+        got: String,
+        /// The name that is near to it.
+        nearest: Option<String>,
+    },
+    /// The method does not run there.
+    #[error("method: expected {expected}, got \"{method}\"")]
+    WrongDevice {
+        /// Name of the method.
+        method: &'static str,
+        /// Which methods run where.
+        expected: String,
+    },
+    /// There is no GPU, or none that opens.
+    #[error("device: expected a GPU (a Vulkan, Metal or DX12 adapter; a software adapter will do): {reason}")]
+    Unavailable {
+        /// What was found instead.
+        reason: String,
+    },
+    /// The GPU gave no answer.
+    #[error("device: {device}: {reason}")]
+    Failed {
+        /// The adapter with its driver.
+        device: String,
+        /// What it says.
+        reason: String,
+    },
+    /// The query is refused.
+    #[error(transparent)]
+    Query(#[from] DetectError),
+}
+
+fn did_you_mean(nearest: Option<&str>) -> String {
+    nearest.map(|name| format!(" (did you mean \"{name}\"?)")).unwrap_or_default()
+}
+
+fn quoted(names: &[&str]) -> String {
+    names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+}
+
+fn unknown(parameter: &'static str, got: &str, known: &[&'static str]) -> DeviceError {
+    DeviceError::Unknown {
+        parameter,
+        expected: format!("one of {}", quoted(known)),
+        got: got.to_owned(),
+        nearest: nearest(got, known.iter().copied()),
+    }
+}
+
+/// A method by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Method {
+    Auto,
+    Cpu(&'static str),
+    Gpu(&'static str),
+}
+
+impl std::str::FromStr for Method {
+    type Err = DeviceError;
+
+    fn from_str(name: &str) -> Result<Self, DeviceError> {
+        let find = |names: &[&'static str]| names.iter().copied().find(|&n| n == name);
+        if name == "auto" {
+            return Ok(Self::Auto);
+        }
+        if let Some(name) = find(&CPU_METHODS) {
+            return Ok(Self::Cpu(name));
+        }
+        find(&GPU_METHODS).map(Self::Gpu).ok_or_else(|| {
+            let known: Vec<_> = CPU_METHODS.into_iter().chain(GPU_METHODS).chain(["auto"]).collect();
+            unknown("method", name, &known)
+        })
+    }
+}
+
+fn wrong_device(method: &'static str, device: &str) -> DeviceError {
+    let expected = format!(
+        "one that runs on device \"{device}\" ({} run on \"cpu\", {} on \"gpu\")",
+        quoted(&CPU_METHODS),
+        quoted(&GPU_METHODS)
+    );
+    DeviceError::WrongDevice { method, expected }
+}
+
+/// Detects with the method `"brute"`, `"bvh"` (CPU), `"grid"`, `"virtual-subdivision"` (GPU) or `"auto"`, on the device.
+///
+/// The GPU is opened at the first call that wants it and kept; one call at a time computes on it. After a failure the next call
+/// opens it anew.
+///
+/// # Errors
+/// [`DeviceError`]; with [`Device::Auto`], a GPU that is missing or fails is none: the CPU answers.
+pub fn detect(
+    mesh: &CollisionMesh,
+    query: &Query<'_>,
+    method: &str,
+    device: Device,
+    pool: &rayon::ThreadPool,
+) -> Result<Detected, DeviceError> {
+    let on_cpu = match (method.parse()?, device) {
+        (Method::Cpu(name), Device::Cpu | Device::Auto) => Some(name),
+        (Method::Auto, Device::Cpu) => Some(CPU_DEFAULT),
+        (Method::Cpu(name), Device::Gpu) => return Err(wrong_device(name, "gpu")),
+        (Method::Gpu(name), Device::Cpu) => return Err(wrong_device(name, "cpu")),
+        (Method::Gpu(_) | Method::Auto, Device::Gpu | Device::Auto) => None,
+    };
+    query.check(mesh)?;
+    if let Some(name) = on_cpu {
+        return detect_on_cpu(mesh, query, name, None, pool);
+    }
+    let name = GPU_METHODS.into_iter().find(|&n| n == method).unwrap_or(GPU_DEFAULT);
+    #[cfg(feature = "gpu")]
+    {
+        SharedGpu::of_process().detect(mesh, query, name, device, pool)
+    }
+    #[cfg(not(feature = "gpu"))]
+    {
+        let reason = "this build has no GPU methods (cargo feature \"gpu\")".to_owned();
+        match device {
+            Device::Auto => {
+                let reason = Reason::NoGpu(format!("\"{name}\": {reason}"));
+                detect_on_cpu(mesh, query, CPU_DEFAULT, Some(reason), pool)
+            }
+            _ => Err(DeviceError::Unavailable { reason }),
+        }
+    }
+}
+
+fn detect_on_cpu(
+    mesh: &CollisionMesh,
+    query: &Query<'_>,
+    method: &'static str,
+    reason: Option<Reason>,
+    pool: &rayon::ThreadPool,
+) -> Result<Detected, DeviceError> {
+    let x: &[Vec3] = query.x_t0;
+    let contacts = collision::detector(method, mesh, x)?.detect(mesh, query, pool)?;
+    Ok(Detected { contacts, method, device: "cpu".to_owned(), reason })
+}
