@@ -29,7 +29,7 @@ def soup(seed: int, count: int = 150) -> tuple[Any, Any, Any]:
 @pytest.fixture(scope="module")
 def gpu() -> str:
     """Name of the adapter; skips where there is none."""
-    x = [[0.0, 0, 0], [1, 0, 0], [0, 0, 1]]
+    x = np.eye(3)
     try:
         found = cs.collision.detect(x, x, [[0, 1, 2]], "grid", device="gpu")
     except cs.GpuUnavailable as reason:
