@@ -21,7 +21,12 @@ const CHEAP_SWEEPS: usize = 10;
 /// Looks that a pass may always take (about 1 ms): small scenes settle as far as their tolerance.
 const FREE_LOOKS: usize = 20_000;
 
-/// Cap on the times that settled sweeps go on with other laws of friction (see [`Kernel::settled`]).
+/// Sweeps before which [`Kernel::review`] is asked for what is plain by then.
+const EARLY_REVIEWS: [usize; 10] = [2, 4, 8, 12, 16, 24, 32, 48, 64, 80];
+/// One in this number of looks and of sweeps is kept for what the review after the settled sweeps changes.
+const KEPT: usize = 3;
+
+/// Cap on the times that settled sweeps go on with other laws of friction (see [`Kernel::review`]).
 const MAX_ROUNDS: usize = 8;
 
 /// The contacts of one step.
@@ -34,6 +39,8 @@ pub(crate) struct ContactSet<K: Kernel> {
     change: Vec<Vec3>,
     /// Conjugate direction [N s].
     direction: Vec<Vec3>,
+    /// Contacts that one look does not settle; all that sweeps look at after the first, where the kernel has reviews.
+    coupled: Vec<u32>,
 }
 
 /// What the sweeps of one pass did.
@@ -46,7 +53,14 @@ pub(crate) struct SweepInfo {
 
 impl<K: Kernel> ContactSet<K> {
     pub(crate) fn new(kernel: K) -> Self {
-        Self { kernel, contacts: Vec::new(), looks: Vec::new(), change: Vec::new(), direction: Vec::new() }
+        Self {
+            kernel,
+            contacts: Vec::new(),
+            looks: Vec::new(),
+            change: Vec::new(),
+            direction: Vec::new(),
+            coupled: Vec::new(),
+        }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -77,6 +91,7 @@ impl<K: Kernel> ContactSet<K> {
             + bytes_of(&self.looks)
             + bytes_of(&self.change)
             + bytes_of(&self.direction)
+            + bytes_of(&self.coupled)
             + self.kernel.bytes()
     }
 
@@ -114,17 +129,35 @@ impl<K: Kernel> ContactSet<K> {
             list.clear();
             list.resize(count, Vec3::zeros());
         }
-        let mut budget = (max_sweeps * count).max(FREE_LOOKS);
+        let (all, most) = ((max_sweeps * count).max(FREE_LOOKS), CHEAP_SWEEPS * max_sweeps);
+        let mut budget = all;
         let mut last_norm = 0.0;
         if count == 0 {
             return info;
         }
         self.kernel.begin(&mut self.contacts, motion.x_t0.len());
+        if K::REVIEWS {
+            let Self { kernel, contacts, coupled, .. } = self;
+            coupled.clear();
+            coupled.extend((0..count as u32).filter(|&i| !kernel.alone(&contacts[i as usize].friction)));
+        }
         let mut rounds = 0;
         loop {
+            if K::REVIEWS && rounds == 0 && EARLY_REVIEWS.contains(&info.sweeps) {
+                self.review(motion, tolerance, Some(info.residual));
+            }
             self.kernel.before_sweep(info.sweeps);
             let mut sweep = Sweep { looks: 0, residual: 0.0, norm: 0.0 };
-            if info.sweeps % 2 == 0 {
+            if K::REVIEWS && info.sweeps > 0 {
+                let coupled = std::mem::take(&mut self.coupled);
+                let one = |i: &u32| self.relax_one(*i as usize, motion, tolerance, &mut sweep);
+                if info.sweeps % 2 == 0 {
+                    coupled.iter().for_each(one);
+                } else {
+                    coupled.iter().rev().for_each(one);
+                }
+                self.coupled = coupled;
+            } else if info.sweeps % 2 == 0 {
                 (0..count).for_each(|i| self.relax_one(i, motion, tolerance, &mut sweep));
             } else {
                 (0..count).rev().for_each(|i| self.relax_one(i, motion, tolerance, &mut sweep));
@@ -132,17 +165,22 @@ impl<K: Kernel> ContactSet<K> {
             info.sweeps += 1;
             info.residual = sweep.residual;
             budget = budget.saturating_sub(sweep.looks);
-            let spent = budget == 0 || info.sweeps >= CHEAP_SWEEPS * max_sweeps;
+            let kept = if K::REVIEWS && rounds == 0 { KEPT } else { usize::MAX };
+            let spent = budget <= all / kept || info.sweeps >= most - most / kept;
             if sweep.residual <= tolerance || spent {
                 rounds += 1;
-                if !self.settled(motion, tolerance) || rounds > MAX_ROUNDS || (spent && rounds > 1) {
+                let over = (spent && rounds > 1) || rounds > MAX_ROUNDS;
+                if !K::REVIEWS || over {
                     break;
                 }
-                // What has let go needs looks of its own.
-                budget = budget.max(count);
-                self.follow(None, motion, tolerance);
-                last_norm = 0.0;
-                continue;
+                if self.review(motion, tolerance, None) {
+                    self.follow(None, motion, tolerance);
+                    last_norm = 0.0;
+                    continue;
+                }
+                if sweep.residual <= tolerance {
+                    break;
+                }
             }
             // A restart forgets the direction, and the change that ended it with it.
             let beta = if last_norm > 0.0 { sweep.norm / last_norm } else { 0.0 };
@@ -152,12 +190,12 @@ impl<K: Kernel> ContactSet<K> {
         info
     }
 
-    /// Lets friction see where the sweeps have settled; whether a contact has to be looked at again.
+    /// Lets friction see how far the sweeps have come; whether a contact has to be looked at again.
     #[inline(never)]
-    fn settled(&mut self, motion: &Motion<'_>, tolerance: f64) -> bool {
+    fn review(&mut self, motion: &Motion<'_>, tolerance: f64, residual: Option<f64>) -> bool {
         let Self { kernel, contacts, looks, .. } = self;
         let mut changed = false;
-        kernel.settled(contacts, motion, tolerance, |i| {
+        kernel.review(contacts, motion, tolerance, residual, |i| {
             looks[i].1 = 0;
             changed = true;
         });
@@ -172,7 +210,9 @@ impl<K: Kernel> ContactSet<K> {
             }
             return;
         };
-        for i in 0..self.contacts.len() {
+        let moving = if K::REVIEWS { self.coupled.len() } else { self.contacts.len() };
+        for k in 0..moving {
+            let i = if K::REVIEWS { self.coupled[k] as usize } else { k };
             let step = self.direction[i] * beta;
             self.direction[i] = step + std::mem::take(&mut self.change[i]);
             let contact = &mut self.contacts[i];
@@ -195,7 +235,9 @@ impl<K: Kernel> ContactSet<K> {
         sweep.looks += 1;
         sweep.residual = sweep.residual.max(error);
         if error > tolerance {
-            sweep.norm += error * error * contact.mass;
+            if !K::REVIEWS || !self.kernel.alone(&contact.friction) {
+                sweep.norm += error * error * contact.mass;
+            }
             self.change[i] = change;
             move_impulse(contact, change, motion);
         }

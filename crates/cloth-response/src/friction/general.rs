@@ -13,7 +13,9 @@
 //! Two things are found before a contact may slide, where others act on the same vertices: whether they hold it together
 //! (each under μ_s λ: a convex problem as with Coulomb; a contact let go too soon would not be caught again, since it slides on
 //! under less), and which contacts share a vertex's area. So the sweeps settle first with all that has not let go under μ_s λ;
-//! then those that still slide let go, for the rest of the step. A contact alone on its vertices is decided at once.
+//! then those that still slide let go, for the rest of the step. What no further sweep can hold lets go on the way there: the
+//! impulse that it lacks is far more than the sweeps still change, or it lacked more than it had at two reviews in a row. A
+//! contact alone on its vertices is decided at once.
 //!
 //! Friction that weakens with the speed is no convex problem: after [`LIVE_SWEEPS`] sweeps each contact keeps the coefficients
 //! of the speed that it has then, and what is left to the sweeps is Coulomb with a linear drag, which settles.
@@ -26,13 +28,18 @@ use cloth_collision::CollisionMesh;
 
 /// Sweeps of one pass in which coefficients follow the speed.
 const LIVE_SWEEPS: usize = 12;
-/// Newton's iteration of the sliding speed ends with a change of less than this fraction of it: its error is then far
-/// below the tolerance of the sweeps, since it falls with the square.
-const NEWTON_CHANGE: f64 = 1e-3;
+/// Relative error of the sliding speed at which Newton's iteration ends, about the square of the change times the curvature.
+const NEWTON_ERROR: f64 = 1e-6;
 /// Cap on Newton's iterations; two or three are usual.
 const NEWTON_STEPS: usize = 40;
 /// What is more than μ_s λ by no more than this fraction holds still: rounding.
 const THRESHOLD_ROUNDING: f64 = 1e-9;
+/// A contact that at two reviews in a row needs this many times μ_s λ to stop slides plainly. Contacts near their threshold, the
+/// ones that depend on the last digits of their neighbours, are below.
+const PLAIN: f64 = 2.0;
+/// What the sweeps still change of a relative velocity, as a multiple of their last correction: the sum of corrections that
+/// fall by 2 % from sweep to sweep.
+const ERROR_OF_RESIDUAL: f64 = 50.0;
 /// A change of a contact's area by more than this fraction is looked at again.
 const AREA_CHANGE: f64 = 1e-9;
 
@@ -83,6 +90,8 @@ pub(crate) struct Sliding {
     law: u32,
     /// Has let go in this step.
     broken: bool,
+    /// Was far beyond μ_s λ at the last review.
+    plain: bool,
     /// No other contact acts on its vertices.
     alone: bool,
     /// Area of contact [m²].
@@ -180,7 +189,8 @@ impl General {
                 continue;
             }
             let next = next.min(most);
-            let small = (next - s).abs() <= NEWTON_CHANGE * s * rate.min(1.0);
+            let change = (next - s) / s;
+            let small = change * change * (rate - 1.0).abs() <= NEWTON_ERROR * rate.min(1.0);
             s = next;
             if small || steps == NEWTON_STEPS {
                 break;
@@ -221,7 +231,7 @@ impl Kernel for General {
 
     fn frictionless(&self) -> Sliding {
         let law = (self.laws.len() - 1) as u32;
-        Sliding { law, broken: false, alone: false, area: 0.0, speed: 0.0, mu: 0.0, drag: 0.0 }
+        Sliding { law, broken: false, plain: false, alone: false, area: 0.0, speed: 0.0, mu: 0.0, drag: 0.0 }
     }
 
     #[inline]
@@ -278,19 +288,28 @@ impl Kernel for General {
         self.frozen = sweep >= LIVE_SWEEPS;
     }
 
-    fn settled(
+    const REVIEWS: bool = true;
+
+    #[inline]
+    fn alone(&self, state: &Sliding) -> bool {
+        state.alone
+    }
+
+    fn review(
         &mut self,
         contacts: &mut [Contact<Sliding>],
         motion: &Motion<'_>,
         tolerance: f64,
+        residual: Option<f64>,
         mut again: impl FnMut(usize),
     ) {
         if self.viscous {
             let mut load = std::mem::take(&mut self.load);
             load.clear();
             load.resize(self.areas.len(), 0.0);
-            for contact in
-                contacts.iter().filter(|c| c.normal.dot(&c.impulse) > 0.0 && self.acts(&c.friction))
+            for contact in contacts
+                .iter()
+                .filter(|c| !c.friction.alone && c.normal.dot(&c.impulse) > 0.0 && self.acts(&c.friction))
             {
                 for k in 0..4 {
                     load[contact.vertices[k] as usize] += contact.weights[k].abs();
@@ -309,8 +328,16 @@ impl Kernel for General {
                 let sliding = u - contact.normal * contact.normal.dot(&u);
                 let stop = contact.impulse - contact.normal * lambda - sliding * contact.mass;
                 let threshold = self.laws[contact.friction.law as usize].mu_s * lambda;
-                changed = sliding.norm() > tolerance && stop.norm() > threshold * (1.0 + THRESHOLD_ROUNDING);
+                let needed = stop.norm();
+                let beyond = sliding.norm() > tolerance && needed > threshold * (1.0 + THRESHOLD_ROUNDING);
+                let plain = needed > threshold * PLAIN;
+                changed = beyond
+                    && residual.is_none_or(|residual| {
+                        (plain && contact.friction.plain)
+                            || needed - threshold > ERROR_OF_RESIDUAL * residual * contact.mass
+                    });
                 contact.friction.broken = changed;
+                contact.friction.plain = plain;
             }
             if self.viscous {
                 let area = contact_area(&self.areas, contact, |v| self.load[v]);

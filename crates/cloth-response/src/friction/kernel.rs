@@ -33,13 +33,21 @@ pub(crate) trait Kernel {
     /// Before sweep number `sweep`.
     fn before_sweep(&mut self, sweep: usize);
 
-    /// Where the sweeps have settled: what their result changes in the contacts' laws. Calls `again` for each contact that
-    /// has changed.
-    fn settled(
+    /// Whether [`Kernel::review`] may change a contact's law.
+    const REVIEWS: bool;
+
+    /// Whether one look settles the contact, since no other acts on its vertices. Only asked where there are reviews.
+    fn alone(&self, state: &Self::State) -> bool;
+
+    /// What the sweeps so far change in the contacts' laws. Calls `again` for each contact that has changed.
+    ///
+    /// `residual`: largest correction of the last sweep \[m/s\], `None` where the sweeps have settled or can do no more.
+    fn review(
         &mut self,
         contacts: &mut [Contact<Self::State>],
         motion: &Motion<'_>,
         tolerance: f64,
+        residual: Option<f64>,
         again: impl FnMut(usize),
     );
 
@@ -88,12 +96,20 @@ impl Kernel for Coulomb {
     #[inline]
     fn before_sweep(&mut self, _sweep: usize) {}
 
+    const REVIEWS: bool = false;
+
     #[inline]
-    fn settled(
+    fn alone(&self, _state: &f64) -> bool {
+        false
+    }
+
+    #[inline]
+    fn review(
         &mut self,
         _contacts: &mut [Contact<f64>],
         _motion: &Motion<'_>,
         _tolerance: f64,
+        _residual: Option<f64>,
         _again: impl FnMut(usize),
     ) {
     }
