@@ -21,8 +21,6 @@ const CHEAP_SWEEPS: usize = 10;
 /// Looks that a pass may always take (about 1 ms): small scenes settle as far as their tolerance.
 const FREE_LOOKS: usize = 20_000;
 
-/// Sweeps before which [`Kernel::review`] is asked for what is plain by then.
-const EARLY_REVIEWS: [usize; 10] = [2, 4, 8, 12, 16, 24, 32, 48, 64, 80];
 /// One in this number of looks and of sweeps is kept for what the review after the settled sweeps changes.
 const KEPT: usize = 3;
 
@@ -143,9 +141,6 @@ impl<K: Kernel> ContactSet<K> {
         }
         let mut rounds = 0;
         loop {
-            if K::REVIEWS && rounds == 0 && EARLY_REVIEWS.contains(&info.sweeps) {
-                self.review(motion, tolerance, Some(info.residual));
-            }
             self.kernel.before_sweep(info.sweeps);
             let mut sweep = Sweep { looks: 0, residual: 0.0, norm: 0.0 };
             if K::REVIEWS && info.sweeps > 0 {
@@ -173,7 +168,7 @@ impl<K: Kernel> ContactSet<K> {
                 if !K::REVIEWS || over {
                     break;
                 }
-                if self.review(motion, tolerance, None) {
+                if self.review(motion, tolerance) {
                     self.follow(None, motion, tolerance);
                     last_norm = 0.0;
                     continue;
@@ -192,10 +187,10 @@ impl<K: Kernel> ContactSet<K> {
 
     /// Lets friction see how far the sweeps have come; whether a contact has to be looked at again.
     #[inline(never)]
-    fn review(&mut self, motion: &Motion<'_>, tolerance: f64, residual: Option<f64>) -> bool {
+    fn review(&mut self, motion: &Motion<'_>, tolerance: f64) -> bool {
         let Self { kernel, contacts, looks, .. } = self;
         let mut changed = false;
-        kernel.review(contacts, motion, tolerance, residual, |i| {
+        kernel.review(contacts, motion, tolerance, |i| {
             looks[i].1 = 0;
             changed = true;
         });

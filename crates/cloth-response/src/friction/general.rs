@@ -13,9 +13,7 @@
 //! Two things are found before a contact may slide, where others act on the same vertices: whether they hold it together
 //! (each under μ_s λ: a convex problem as with Coulomb; a contact let go too soon would not be caught again, since it slides on
 //! under less), and which contacts share a vertex's area. So the sweeps settle first with all that has not let go under μ_s λ;
-//! then those that still slide let go, for the rest of the step. What no further sweep can hold lets go on the way there: the
-//! impulse that it lacks is far more than the sweeps still change, or it lacked more than it had at two reviews in a row. A
-//! contact alone on its vertices is decided at once.
+//! then those that still slide let go, for the rest of the step. A contact alone on its vertices is decided at once.
 //!
 //! Friction that weakens with the speed is no convex problem: after [`LIVE_SWEEPS`] sweeps each contact keeps the coefficients
 //! of the speed that it has then, and what is left to the sweeps is Coulomb with a linear drag, which settles.
@@ -34,12 +32,6 @@ const NEWTON_ERROR: f64 = 1e-6;
 const NEWTON_STEPS: usize = 40;
 /// What is more than μ_s λ by no more than this fraction holds still: rounding.
 const THRESHOLD_ROUNDING: f64 = 1e-9;
-/// A contact that at two reviews in a row needs this many times μ_s λ to stop slides plainly. Contacts near their threshold, the
-/// ones that depend on the last digits of their neighbours, are below.
-const PLAIN: f64 = 2.0;
-/// What the sweeps still change of a relative velocity, as a multiple of their last correction: the sum of corrections that
-/// fall by 2 % from sweep to sweep.
-const ERROR_OF_RESIDUAL: f64 = 50.0;
 /// A change of a contact's area by more than this fraction is looked at again.
 const AREA_CHANGE: f64 = 1e-9;
 
@@ -90,8 +82,6 @@ pub(crate) struct Sliding {
     law: u32,
     /// Has let go in this step.
     broken: bool,
-    /// Was far beyond μ_s λ at the last review.
-    plain: bool,
     /// No other contact acts on its vertices.
     alone: bool,
     /// Area of contact [m²].
@@ -231,7 +221,7 @@ impl Kernel for General {
 
     fn frictionless(&self) -> Sliding {
         let law = (self.laws.len() - 1) as u32;
-        Sliding { law, broken: false, plain: false, alone: false, area: 0.0, speed: 0.0, mu: 0.0, drag: 0.0 }
+        Sliding { law, broken: false, alone: false, area: 0.0, speed: 0.0, mu: 0.0, drag: 0.0 }
     }
 
     #[inline]
@@ -300,7 +290,6 @@ impl Kernel for General {
         contacts: &mut [Contact<Sliding>],
         motion: &Motion<'_>,
         tolerance: f64,
-        residual: Option<f64>,
         mut again: impl FnMut(usize),
     ) {
         if self.viscous {
@@ -329,15 +318,8 @@ impl Kernel for General {
                 let stop = contact.impulse - contact.normal * lambda - sliding * contact.mass;
                 let threshold = self.laws[contact.friction.law as usize].mu_s * lambda;
                 let needed = stop.norm();
-                let beyond = sliding.norm() > tolerance && needed > threshold * (1.0 + THRESHOLD_ROUNDING);
-                let plain = needed > threshold * PLAIN;
-                changed = beyond
-                    && residual.is_none_or(|residual| {
-                        (plain && contact.friction.plain)
-                            || needed - threshold > ERROR_OF_RESIDUAL * residual * contact.mass
-                    });
+                changed = sliding.norm() > tolerance && needed > threshold * (1.0 + THRESHOLD_ROUNDING);
                 contact.friction.broken = changed;
-                contact.friction.plain = plain;
             }
             if self.viscous {
                 let area = contact_area(&self.areas, contact, |v| self.load[v]);

@@ -39,15 +39,13 @@ pub(crate) trait Kernel {
     /// Whether one look settles the contact, since no other acts on its vertices. Only asked where there are reviews.
     fn alone(&self, state: &Self::State) -> bool;
 
-    /// What the sweeps so far change in the contacts' laws. Calls `again` for each contact that has changed.
-    ///
-    /// `residual`: largest correction of the last sweep \[m/s\], `None` where the sweeps have settled or can do no more.
+    /// What sweeps that have settled, or can do no more, change in the contacts' laws. Calls `again` for each contact that has
+    /// changed.
     fn review(
         &mut self,
         contacts: &mut [Contact<Self::State>],
         motion: &Motion<'_>,
         tolerance: f64,
-        residual: Option<f64>,
         again: impl FnMut(usize),
     );
 
@@ -109,7 +107,6 @@ impl Kernel for Coulomb {
         _contacts: &mut [Contact<f64>],
         _motion: &Motion<'_>,
         _tolerance: f64,
-        _residual: Option<f64>,
         _again: impl FnMut(usize),
     ) {
     }
