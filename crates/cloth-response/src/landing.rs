@@ -80,21 +80,21 @@ impl Landing {
         let one_vertex = |a: &Stencil, b: &Stencil| {
             a.kind == StencilKind::VertexTriangle && b.kind == a.kind && a.vertices[0] == b.vertices[0]
         };
+        let mut landed: Vec<Landed> = Vec::new();
         for pairs in near.chunk_by(one_vertex) {
-            for (k, &start) in pairs.iter().enumerate() {
+            landed.clear();
+            for &start in pairs {
                 let end = self.end(&start, mesh, x_t1);
-                let taken = |other: &Stencil, tie: bool| {
-                    (other.distance < start.distance || (tie && other.distance == start.distance))
-                        && self.end(other, mesh, x_t1).map(|o| o.vertices) == end.map(|e| e.vertices)
+                let same = |other: &&mut Landed| {
+                    end.is_some() && other.end.map(|o| o.vertices) == end.map(|e| e.vertices)
                 };
-                let again = pairs.len() > 1
-                    && end.is_some()
-                    && (pairs[..k].iter().any(|o| taken(o, true))
-                        || pairs[k + 1..].iter().any(|o| taken(o, false)));
-                if !again {
-                    take(Landed { start, end });
+                match landed.iter_mut().find(same) {
+                    Some(other) if start.distance < other.start.distance => *other = Landed { start, end },
+                    Some(_) => {}
+                    None => landed.push(Landed { start, end }),
                 }
             }
+            landed.iter().for_each(|&pair| take(pair));
         }
     }
 
