@@ -94,7 +94,9 @@ impl Landing {
                     None => landed.push(Landed { start, end }),
                 }
             }
-            landed.iter().for_each(|&pair| take(pair));
+            for &pair in &landed {
+                take(pair);
+            }
         }
     }
 
