@@ -85,17 +85,13 @@ def _cantilever(state: State) -> ClosedForm | None:
         return None
     cloth = data["cloth"][0]
     material = cloth["material"]
-    if not isinstance(material, str) and "fabric" in material:
-        text = _core.material_named(material["fabric"], material["bending"])
-        hinges = material.get("hinges")
-    else:
-        text = _core.material_named(material, "linear") if isinstance(material, str) else json.dumps(material)
-        hinges = None
-    table = json.loads(text)
+    if isinstance(material, str):
+        material = {"fabric": material, "bending": "linear"}
+    fabric = material.get("fabric")
+    table = json.loads(_core.material_named(fabric, material["bending"])) if fabric else material
     bending = table["bending"]
-    hinges = hinges or bending.get("hinges", "coupled")
     fixed = [p for p in cloth.get("pins", []) if not p.get("keyframes") and not p.get("collider")]
-    known = bending["model"] in ("hinge", "linear") and hinges == "coupled" and cloth["mesh"].get("generator") == "grid"
+    known = bending["model"] in ("hinge", "linear") and cloth["mesh"].get("generator") == "grid"
     gravity = _gravity(data)
     up = 1 if data["up"] == "y" else 2
     falls = gravity[up] < 0.0 and not np.delete(gravity, up).any()

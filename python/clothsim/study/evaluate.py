@@ -51,8 +51,7 @@ def row(settings: Settings, runs: Sequence[Run], metrics: Sequence[Metric], refe
         notes.append(f"{totals['not_converged']} steps met a cap before their tolerance")
     if found := max(run.facts["intersections"] for run in runs):
         notes.append(f"{found} pairs of triangles pass through each other at the end")
-    if disturbed := sum(run.facts["disturbed"] for run in runs):
-        notes.append(f"{disturbed} timed runs were disturbed")
+    totals["disturbed"] = sum(run.facts["disturbed"] for run in runs)
     if any(run.facts.get("repeatable") is False for run in runs):
         notes.append("repeats did not end with the same bits")
     median = float(np.median(walls)) if walls else None

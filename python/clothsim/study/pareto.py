@@ -8,6 +8,8 @@ import numpy as np
 
 __all__ = ["front", "order"]
 
+# What an error has to be of that of all cheaper points.
+_GAIN = 0.99
 # Values that a fit of an order takes at most, from the finest.
 _MOST = 3
 # Steps nearer to each other than by this factor say too little about a slope.
@@ -15,10 +17,10 @@ _APART = 1.4
 
 
 def front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
-    """Indices, cheapest first, of the points that no other point beats in cost and equals or beats in error."""
+    """Indices, cheapest first, of the points whose error no cheaper point comes near; a hundredth is no gain."""
     best, chosen = np.inf, []
     for k in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
-        if errors[k] < best:
+        if errors[k] < _GAIN * best:
             best = errors[k]
             chosen.append(k)
     return chosen

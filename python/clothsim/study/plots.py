@@ -17,6 +17,8 @@ __all__ = ["draw"]
 _COLOURS = ("#2f5d8c", "#9c2f35", "#c08a2e", "#3f7a57", "#7a5195", "#5aa0a8", "#c46f9b", "#8d8a84", "#a8a03c")
 _MARKS = "os^Dv<>Ph*"
 _MOST_NAMED = 12
+# Where numbers stand beside their points, in turn where points are close [pt].
+_BESIDE = ((8, 7), (-16, -17), (-16, 8), (9, -17))
 
 
 def draw(study: Study, error: float | None = None, cost: float | None = None) -> tuple[bytes, bytes]:
@@ -45,8 +47,7 @@ def _note(study: Study) -> str:
     where = study.machine
     fixed = ", ".join(f"{k} = {value_text(v)}" for k, v in study.fixed.items())
     parts = [f"{study.duration:g} s simulated" + (f" with {fixed}" if fixed else "")]
-    repeats = max((row.repeats for row in study.rows), default=0)
-    parts.append(f"{where['processor']}, one process per core, median of {repeats}")
+    parts.append(f"{where['processor']}, one process per core, medians")
     if not study.converged:
         parts.append("THE REFERENCE IS NOT CONVERGED")
     return "; ".join(parts)
@@ -99,16 +100,19 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
         if known:
             style = "-" if along else ""
             axis.plot(*zip(*known, strict=True), style + mark, color=colour, ms=5.5, lw=1.2, alpha=0.85, label=name)
-    best = [(getattr(r, study.cost), _error(study, r)) for r in study.best()]
-    best = [(c, e) for c, e in best if e]
+    best = [(float(getattr(r, study.cost)), e) for r in study.best() if (e := _error(study, r)) is not None]
     if best:
         axis.plot(*zip(*best, strict=True), "-", color=INK, lw=4.5, alpha=0.13, zorder=1, solid_capstyle="round")
         axis.plot(*zip(*best, strict=True), "o", mfc="none", mec=INK, ms=12, mew=1.4, zorder=4, label="front")
+        turn = 0
         for n, (c, e) in enumerate(best, start=1):
+            near = n > 1 and c < 1.25 * best[n - 2][0] and e > 0.4 * best[n - 2][1]
+            turn = (turn + 1) % len(_BESIDE) if near else 0
             if _named(n - 1, len(best)):
                 axis.annotate(
-                    str(n), (c, e), xytext=(8, 7), textcoords="offset points", fontsize=9.5, color=INK, weight="bold"
-                )
+                    str(n), (c, e), xytext=_BESIDE[turn], textcoords="offset points", fontsize=9.5, color=INK,
+                    weight="bold",
+                )  # fmt: skip
     _scales(axis, study)
     _floor(axis, study)
     title = f"{study.metric.name} over {words}"
@@ -166,11 +170,11 @@ def _convergence(axis: Any, study: Study, along: Axis) -> None:
         _, colour, mark, rows = series
         axis.plot(*zip(*known, strict=True), "-" + mark, color=colour, ms=5.5, lw=1.2, alpha=0.85)
         order = orders.get(label(rows[0].settings, others))
-        if order is not None and order > 0.5 and round(order) not in guided and along.refines < 0:
+        if order is not None and order > 0.5 and round(order) not in guided:
             guided.add(round(order))
             floor = 10.0 * study.own_error(rows[0])
-            trusted = [(h, e) for h, e in known if e > floor]
-            _guide(axis, trusted, round(order))
+            finest_first = known if along.refines < 0 else known[::-1]
+            _guide(axis, [(h, e) for h, e in finest_first if e > floor], -along.refines * round(order))
     _scales(axis, study)
     _floor(axis, study)
     title = "the same over " + ("the time step" if along.key == "time.dt" else along.name)
@@ -178,14 +182,16 @@ def _convergence(axis: Any, study: Study, along: Axis) -> None:
     tidy(axis, title, f"{along.name}{unit}", "")
 
 
-def _guide(axis: Any, points: list[tuple[float, float]], order: int) -> None:
-    """A dotted line of a whole order beside the finest points of a series."""
-    (low, error), high = points[0], points[min(3, len(points) - 1)][0]
+def _guide(axis: Any, points: list[tuple[float, float]], slope: int) -> None:
+    """A dotted line of a whole order beside the finest points of a series, finest first."""
+    (finest, error), coarsest = points[0], points[min(3, len(points) - 1)][0]
     apart = 0.45
-    axis.plot([low, high], [apart * error, apart * error * (high / low) ** order], ":", color=INK, lw=1.3, zorder=0)
+    end = apart * error * (coarsest / finest) ** slope
+    axis.plot([finest, coarsest], [apart * error, end], ":", color=INK, lw=1.3, zorder=0)
+    beside = (5, -3) if slope > 0 else (-5, -3)
     axis.annotate(
-        f"order {order}", (high, apart * error * (high / low) ** order), fontsize=9, color=INK, xytext=(5, -3),
-        textcoords="offset points", va="center",
+        f"order {abs(slope)}", (coarsest, end), fontsize=9, color=INK, xytext=beside, textcoords="offset points",
+        va="center", ha="left" if slope > 0 else "right",
     )  # fmt: skip
 
 

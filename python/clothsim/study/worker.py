@@ -32,7 +32,7 @@ LATE = 0.75
 # A timed run was disturbed if it took this many times its processor time and a reading of the clock [s].
 _WAITED, _CLOCK = 1.05, 1e-4
 # Runs at most, in place of disturbed ones too, over the repeats asked for.
-_TRIES = 4
+_TRIES = 2
 
 
 def pack_scene(scene: Scene) -> bytes:
