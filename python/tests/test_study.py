@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import importlib
 import json
+import shlex
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,6 +19,7 @@ import pytest
 from conftest import ROOT, RunCli, cli_command
 
 import clothsim as cs
+from clothsim._cli import main
 from clothsim.study import evaluate, pareto, quantities, surface
 from clothsim.study.axes import axis, parse
 from clothsim.study.disturb import field
@@ -324,9 +327,9 @@ def test_free_fall_is_recognised_and_first_order(tmp_path: Path) -> None:
     assert "free fall" in found.statement[0]
     # Backward Euler falls g T dt/2 too far.
     for row in found.rows:
-        assert error(row, "rms") == pytest.approx(0.5 * 9.81 * 0.1 * row.settings["dt"], rel=1e-4)
+        assert error(row, "rms") == pytest.approx(0.5 * 9.81 * 0.1 * row.settings["dt"], rel=1e-3)
         assert error(row, "momentum_drift") == pytest.approx(0.0, abs=1e-6)
-    assert found.orders[0].order == pytest.approx(1.0, abs=1e-3)
+    assert found.orders[0].order == pytest.approx(1.0, abs=1e-2)
 
 
 def test_a_scene_that_only_looks_like_a_closed_form_has_none(tmp_path: Path) -> None:
@@ -573,3 +576,50 @@ def test_a_bound_that_nothing_meets_is_said(tmp_path: Path) -> None:
         progress=False,
     )  # fmt: skip
     assert not found.met and found.scene is None and "not found" in found.statement
+
+
+# Docs -----------------------------------------------------------------------------------------------------------
+
+PAGES = [ROOT / "docs" / "study.md", ROOT / "gallery" / "README.md", ROOT / "README.md"]
+
+
+def commands(page: Path) -> list[list[str]]:
+    blocks = page.read_text().split("```sh\n")[1:]
+    lines = [shlex.split(line, comments=True) for block in blocks for line in block.split("```")[0].splitlines()]
+    return [words[1:] for words in lines if words[:2] in (["clothsim", "study"], ["clothsim", "tune"])]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.parent.name + "/" + p.name)
+def test_commands_in_the_docs_can_be_run(page: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but the runs: the scene is there, and every axis and value is known."""
+    monkeypatch.chdir(ROOT)
+    seen: list[Request] = []
+
+    def stop(request: Request, *_: Any, **__: Any) -> None:
+        seen.append(request)
+        raise cs.ClothSimError("stopped")
+
+    monkeypatch.setattr("clothsim.study.job.run", stop)
+    found = commands(page)
+    assert found
+    for words in found:
+        words[words.index("-o") + 1] = "/nonexistent/out"
+        if words[0] == "study":
+            assert main(words) == 1
+            assert len(seen.pop().points) > 1
+
+
+def test_the_example_in_the_docs_runs(tmp_path: Path) -> None:
+    code = PAGES[0].read_text().split("```python\n")[1].split("```")[0]
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "rk4, dt 0.0002" in done.stdout and (tmp_path / "tuned.toml").exists()
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "gallery").glob("*/study.json")), ids=lambda p: p.parent.name)
+def test_the_gallery_was_made_by_the_command_that_it_names(path: Path) -> None:
+    facts = json.loads(path.read_text())
+    assert f"-o gallery/{path.parent.name}" in facts["command"]
+    assert facts["command"] in (path.parent.parent / "README.md").read_text()
+    assert not [r["error"] for r in facts["rows"] if r["error"] and "diverged" not in r["error"]]
+    assert all((path.parent / name).exists() for name in FILES)

@@ -114,7 +114,7 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
                     weight="bold",
                 )  # fmt: skip
     _scales(axis, study)
-    _floor(axis, study)
+    _floor(axis, study, left=True)
     title = f"{study.metric.name} over {words}"
     tidy(axis, title, f"{words} [{unit}]", f"{study.metric.name} [{study.metric.unit}]")
 
@@ -145,16 +145,16 @@ def _scales(axis: Any, study: Study) -> None:
         axis.xaxis.set_minor_formatter(ticker.NullFormatter())
 
 
-def _floor(axis: Any, study: Study) -> None:
-    """Shade what lies within the reference's own error."""
+def _floor(axis: Any, study: Study, *, left: bool) -> None:
+    """Shade what lies within the reference's own error; its name stands at the left or the right."""
     own = max((r.errors.get(study.metric.name) or 0.0 for _, r in study.references), default=0.0)
     low, high = axis.get_ylim()
     if own <= low or not any(_error(study, row) for row in study.rows):
         return
     axis.axhspan(low * 1e-3, own, color=FAINT, alpha=0.16, lw=0, zorder=0)
     axis.text(
-        0.99, min(own, high), "the reference's own error ", transform=axis.get_yaxis_transform(), fontsize=8.5,
-        color=FAINT, ha="right", va="bottom" if own < 0.3 * high else "top",
+        0.01 if left else 0.99, min(own, high), " the reference's own error ", transform=axis.get_yaxis_transform(), fontsize=8.5,
+        color=FAINT, ha="left" if left else "right", va="bottom" if own < 0.3 * high else "top",
     )  # fmt: skip
     axis.set_ylim(low, high)
 
@@ -176,7 +176,7 @@ def _convergence(axis: Any, study: Study, along: Axis) -> None:
             finest_first = known if along.refines < 0 else known[::-1]
             _guide(axis, [(h, e) for h, e in finest_first if e > floor], -along.refines * round(order))
     _scales(axis, study)
-    _floor(axis, study)
+    _floor(axis, study, left=along.refines > 0)
     title = "the same over " + ("the time step" if along.key == "time.dt" else along.name)
     unit = " [s]" if along.key == "time.dt" else ""
     tidy(axis, title, f"{along.name}{unit}", "")
