@@ -106,6 +106,12 @@ pub(crate) fn device_error(py: Python<'_>, error: &DeviceError) -> PyErr {
         DeviceError::WrongDevice { method, expected } => {
             invalid_input(py, "method", expected, &format!("\"{method}\""))
         }
+        DeviceError::OtherMethod { parameter, owner, method } => invalid_input(
+            py,
+            parameter,
+            &format!("nothing, as only the method \"{owner}\" has it"),
+            &format!("a value for \"{method}\""),
+        ),
         DeviceError::Unavailable { .. } => exception(py, "GpuUnavailable", &error.to_string(), |_| Ok(())),
         DeviceError::Failed { device, .. } => {
             exception(py, "DeviceError", &error.to_string(), |attributes| {

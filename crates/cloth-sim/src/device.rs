@@ -5,6 +5,8 @@ use crate::collision::{self, CollisionMesh, Contacts, DetectError, Query};
 use crate::scene::nearest;
 
 #[cfg(feature = "gpu")]
+mod methods;
+#[cfg(feature = "gpu")]
 mod shared;
 #[cfg(feature = "gpu")]
 pub use shared::SharedGpu;
@@ -18,6 +20,34 @@ const CPU_DEFAULT: &str = "bvh";
 /// The method of `"auto"` on a GPU.
 const GPU_DEFAULT: &str = "virtual-subdivision";
 const DEVICES: [&str; 3] = ["cpu", "gpu", "auto"];
+
+/// The method that has λ.
+const SUBDIVIDING: &str = "virtual-subdivision";
+
+/// Choices within a GPU's method; the contacts never depend on them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tuning {
+    /// λ of `"virtual-subdivision"` (thesis Eq. 5.1): cells are 3 λ times the average radius. From 0.1 to 100; by default 1.2.
+    pub cell_factor: Option<f64>,
+}
+
+impl Tuning {
+    fn check(&self, method: &str) -> Result<(), DeviceError> {
+        let Some(got) = self.cell_factor else { return Ok(()) };
+        let parameter = "cell_factor";
+        if !(0.1..=100.0).contains(&got) {
+            return Err(DetectError::Parameter { parameter, expected: "λ from 0.1 to 100", got }.into());
+        }
+        if method != SUBDIVIDING {
+            return Err(DeviceError::OtherMethod {
+                parameter,
+                owner: SUBDIVIDING,
+                method: method.to_owned(),
+            });
+        }
+        Ok(())
+    }
+}
 
 /// Where to detect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +82,8 @@ pub struct Detected {
     pub method: &'static str,
     /// `"cpu"`, or the adapter with its driver.
     pub device: String,
+    /// What only this method counts: registrations, parts, bytes on the device; none on the CPU.
+    pub counts: Vec<(&'static str, u64)>,
     /// Why the CPU, where a GPU would have been taken.
     pub reason: Option<Reason>,
 }
@@ -87,6 +119,18 @@ pub enum DeviceError {
         method: &'static str,
         /// Which methods run where.
         expected: String,
+    },
+    /// The method has no such parameter.
+    #[error(
+        "{parameter}: expected nothing, as only the method \"{owner}\" has it, got a value for \"{method}\""
+    )]
+    OtherMethod {
+        /// The parameter.
+        parameter: &'static str,
+        /// The method that has it.
+        owner: &'static str,
+        /// The method that was asked for.
+        method: String,
     },
     /// There is no GPU, or none that opens.
     #[error("device: expected a GPU (a Vulkan, Metal or DX12 adapter; a software adapter will do): {reason}")]
@@ -162,7 +206,7 @@ fn wrong_device(method: &'static str, device: &str) -> DeviceError {
 /// Detects with the method `"brute"`, `"bvh"` (CPU), `"grid"`, `"virtual-subdivision"` (GPU) or `"auto"`, on the device.
 ///
 /// The GPU is opened at the first call that wants it and kept; one call at a time computes on it. After a failure the next call
-/// opens it anew.
+/// opens it anew. The last two topologies stay on it, so that calls for the same mesh do not write it again.
 ///
 /// # Errors
 /// [`DeviceError`]; with [`Device::Auto`], a GPU that is missing or fails is none: the CPU answers.
@@ -170,10 +214,13 @@ pub fn detect(
     mesh: &CollisionMesh,
     query: &Query<'_>,
     method: &str,
+    tuning: &Tuning,
     device: Device,
     pool: &rayon::ThreadPool,
 ) -> Result<Detected, DeviceError> {
-    let on_cpu = match (method.parse()?, device) {
+    let kind = method.parse()?;
+    tuning.check(method)?;
+    let on_cpu = match (kind, device) {
         (Method::Cpu(name), Device::Cpu | Device::Auto) => Some(name),
         (Method::Auto, Device::Cpu) => Some(CPU_DEFAULT),
         (Method::Cpu(name), Device::Gpu) => return Err(wrong_device(name, "gpu")),
@@ -187,7 +234,7 @@ pub fn detect(
     let name = GPU_METHODS.into_iter().find(|&n| n == method).unwrap_or(GPU_DEFAULT);
     #[cfg(feature = "gpu")]
     {
-        SharedGpu::of_process().detect(mesh, query, name, device, pool)
+        SharedGpu::of_process().detect(mesh, query, name, tuning, device, pool)
     }
     #[cfg(not(feature = "gpu"))]
     {
@@ -211,5 +258,5 @@ fn detect_on_cpu(
 ) -> Result<Detected, DeviceError> {
     let x: &[Vec3] = query.x_t0;
     let contacts = collision::detector(method, mesh, x)?.detect(mesh, query, pool)?;
-    Ok(Detected { contacts, method, device: "cpu".to_owned(), reason })
+    Ok(Detected { contacts, method, device: "cpu".to_owned(), counts: vec![], reason })
 }

@@ -1,9 +1,10 @@
 //! One open GPU for many calls.
 
-use super::{CPU_DEFAULT, Detected, Device, DeviceError, Reason, detect_on_cpu};
-use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, Query};
-use crate::gpu::{AdapterChoice, Gpu, GpuError, GpuOptions, GridGpu};
-use std::sync::{Arc, Mutex, PoisonError};
+use super::methods::Kept;
+use super::{CPU_DEFAULT, Detected, Device, DeviceError, Reason, Tuning, detect_on_cpu};
+use crate::collision::{CollisionMesh, DetectError, Query};
+use crate::gpu::{AdapterChoice, Gpu, GpuError, GpuOptions};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A GPU that is opened when it is first wanted and kept. Its calls compute one after the other, so that a failure belongs to one.
 #[derive(Debug)]
@@ -16,20 +17,27 @@ pub struct SharedGpu {
 struct State {
     /// The process that opened it: a forked one inherits the memory, not the driver's threads.
     process: u32,
-    gpu: Option<Arc<Gpu>>,
+    open: Option<Open>,
     /// What the search for a GPU that is no software adapter found, if it found none.
     no_hardware: Option<String>,
 }
 
+#[derive(Debug)]
+struct Open {
+    gpu: Arc<Gpu>,
+    kept: Kept,
+}
+
 impl State {
     const fn new(process: u32) -> Self {
-        Self { process, gpu: None, no_hardware: None }
+        Self { process, open: None, no_hardware: None }
     }
+}
 
-    fn open(&mut self, choice: AdapterChoice) -> Result<Arc<Gpu>, GpuError> {
+impl Open {
+    fn new(choice: AdapterChoice) -> Result<Self, GpuError> {
         let gpu = Gpu::new(GpuOptions { adapter: choice, ..GpuOptions::default() })?;
-        self.gpu = Some(gpu.clone());
-        Ok(gpu)
+        Ok(Self { gpu, kept: Kept::default() })
     }
 }
 
@@ -48,7 +56,16 @@ impl SharedGpu {
 
     /// The GPU that is open, if one is.
     pub fn gpu(&self) -> Option<Arc<Gpu>> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).gpu.clone()
+        self.lock().open.as_ref().map(|open| open.gpu.clone())
+    }
+
+    #[cfg(test)]
+    pub(crate) fn uploads(&self) -> u64 {
+        self.lock().open.as_ref().map_or(0, |open| open.kept.built())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Detects with one of [`super::GPU_METHODS`]; for [`Device::Auto`], without a GPU, on the CPU.
@@ -60,10 +77,11 @@ impl SharedGpu {
         mesh: &CollisionMesh,
         query: &Query<'_>,
         method: &'static str,
+        tuning: &Tuning,
         device: Device,
         pool: &rayon::ThreadPool,
     ) -> Result<Detected, DeviceError> {
-        let reason = match self.attempt(mesh, query, method, device, pool) {
+        let reason = match self.attempt(mesh, query, method, tuning, device, pool) {
             Err(DeviceError::Unavailable { reason }) if device == Device::Auto => {
                 Reason::NoGpu(format!("\"{method}\": {reason}"))
             }
@@ -80,16 +98,23 @@ impl SharedGpu {
         mesh: &CollisionMesh,
         query: &Query<'_>,
         method: &'static str,
+        tuning: &Tuning,
         device: Device,
         pool: &rayon::ThreadPool,
     ) -> Result<Detected, DeviceError> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let gpu = self.open(&mut state, device).map_err(|reason| DeviceError::Unavailable { reason })?;
-        let description = gpu.description();
-        match contacts(&gpu, mesh, query, method, pool) {
-            Ok(contacts) => Ok(Detected { contacts, method, device: description, reason: None }),
+        let mut state = self.lock();
+        let open = self.open(&mut state, device).map_err(|reason| DeviceError::Unavailable { reason })?;
+        let description = open.gpu.description();
+        let answer = open.kept.get(&open.gpu, mesh, method, tuning).and_then(|kept| {
+            let contacts = kept.detect(mesh, query, pool)?;
+            Ok((contacts, kept.counts()))
+        });
+        match answer {
+            Ok((contacts, counts)) => {
+                Ok(Detected { contacts, method, device: description, counts, reason: None })
+            }
             Err(DetectError::Device { reason, .. }) => {
-                state.gpu = None;
+                state.open = None;
                 Err(DeviceError::Failed { device: description, reason })
             }
             Err(error) => Err(error.into()),
@@ -97,44 +122,26 @@ impl SharedGpu {
     }
 
     /// The GPU for that device, opened if it is not, or why there is none.
-    fn open(&self, state: &mut State, device: Device) -> Result<Arc<Gpu>, String> {
+    fn open<'s>(&self, state: &'s mut State, device: Device) -> Result<&'s mut Open, String> {
         let process = std::process::id();
         if state.process != process {
             // The parent's driver must not be closed from here.
-            std::mem::forget(state.gpu.take());
+            std::mem::forget(state.open.take());
             *state = State::new(process);
         }
         let hardware_only = device == Device::Auto && !self.takes_software;
-        match &state.gpu {
-            Some(gpu) if !(hardware_only && gpu.is_software()) => return Ok(gpu.clone()),
-            None if !hardware_only => return state.open(AdapterChoice::Any).map_err(|e| e.to_string()),
-            _ => {}
+        if hardware_only && state.open.as_ref().is_none_or(|open| open.gpu.is_software()) {
+            if let Some(reason) = &state.no_hardware {
+                return Err(reason.clone());
+            }
+            return match Open::new(AdapterChoice::Hardware) {
+                Ok(open) => Ok(state.open.insert(open)),
+                Err(error) => Err(state.no_hardware.insert(error.to_string()).clone()),
+            };
         }
-        if let Some(reason) = &state.no_hardware {
-            return Err(reason.clone());
+        match &mut state.open {
+            Some(open) => Ok(open),
+            none => Ok(none.insert(Open::new(AdapterChoice::Any).map_err(|error| error.to_string())?)),
         }
-        state.open(AdapterChoice::Hardware).map_err(|error| {
-            let reason = error.to_string();
-            state.no_hardware = Some(reason.clone());
-            reason
-        })
     }
-}
-
-fn contacts(
-    gpu: &Arc<Gpu>,
-    mesh: &CollisionMesh,
-    query: &Query<'_>,
-    method: &'static str,
-    pool: &rayon::ThreadPool,
-) -> Result<Contacts, DetectError> {
-    let detector = match method {
-        "grid" => GridGpu::new(gpu.clone(), mesh),
-        _ => GridGpu::virtual_subdivision(gpu.clone(), mesh),
-    };
-    let mut detector = detector.map_err(|error| match error {
-        GpuError::Query(error) => error,
-        error => DetectError::Device { detector: method, reason: error.to_string() },
-    })?;
-    detector.detect(mesh, query, pool)
 }
