@@ -45,6 +45,13 @@ impl GpuMethod {
         }
     }
 
+    /// Memory on the device \[B\].
+    pub(crate) fn bytes(&self) -> u64 {
+        match self {
+            Self::Grid(grid) => grid.bytes(),
+        }
+    }
+
     /// What the last call counted beside [`crate::collision::DetectStats`], and the memory on the device \[B\].
     pub(crate) fn counts(&self) -> Vec<(&'static str, u64)> {
         match self {
