@@ -42,7 +42,7 @@ impl Responder {
                 Contacts::General(ContactSet::new(General::new(params.friction.laws())))
             },
             params,
-            stages: Stages::new(mesh),
+            stages: Stages::default(),
         })
     }
 

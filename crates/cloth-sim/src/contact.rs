@@ -100,6 +100,7 @@ impl ContactStage {
             + size_of_val(&mesh.attached_to[..])
             + size_of_val(&mesh.vertex_owner[..])
             + size_of_val(&mesh.edge_owner[..])
+            + mesh.vertex_triangles.bytes()
             + self.bvh.bytes()
             + self.responder.bytes()
             + self.constraints.as_ref().map_or(0, ConstraintStage::bytes)
