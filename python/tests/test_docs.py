@@ -9,6 +9,7 @@ import pkgutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -105,7 +106,13 @@ def test_the_examples_on_gpus_run(tmp_path: Path) -> None:
     x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1], [0.2, 0.1, 0.2], [1.2, 1, 0.2], [0.2, 1, 1.2]])
     scene = cs.Scene(contact={"thickness": 0.01}, duration=0.1)
     scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton")
-    names = {"cs": cs, "x_t0": x, "x_t1": x - [0, 0.2, 0], "triangles": [[0, 1, 2], [3, 4, 5]], "scene": scene}
+    names: dict[str, Any] = {
+        "cs": cs,
+        "x_t0": x,
+        "x_t1": x - [0, 0.2, 0],
+        "triangles": [[0, 1, 2], [3, 4, 5]],
+        "scene": scene,
+    }
     try:
         for block in blocks:
             exec(block, names)
