@@ -100,7 +100,8 @@ fn octree_pages(
     for (var page = group_index(group, groups); page < pages; page += groups.x * groups.y) {
         let n = counts[page];
         let first = firsts[page];
-        if n < 2u || depth == 0u {
+        // No pair, nothing to divide for.
+        if depth == 0u || n == 0u || (n == 1u && params.top <= params.page) {
             if index == 0u {
                 costs[page] = tests_of(n);
                 for (var k = 0u; k < 3u; k++) { types[3u * page + k] = 0u; }

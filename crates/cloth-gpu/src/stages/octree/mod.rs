@@ -29,7 +29,7 @@ use crate::buffers::{Array, Length};
 use crate::context::Gpu;
 use crate::error::GpuError;
 use crate::kernel::{Kernel, Source};
-use crate::layout::{Entry, LengthParams, OctreeParams};
+use crate::layout::{Entry, LengthParams, OctreeParams, SceneParams};
 use crate::limits::{MAX_LEVELS, PAGE_LEVELS, TALLY_LENGTH, WORKGROUP};
 use crate::recorder::Recorder;
 use crate::stages::bounds::Scene;
@@ -135,12 +135,18 @@ pub fn most_registrations(gpu: &Gpu) -> usize {
 }
 
 /// What the kernels are told: a root around the boxes of the scene.
-pub fn params(scene: &Scene, reach: f32, levels: Levels, room: u32, is_two_stage: bool) -> OctreeParams {
-    let extents = [0, 1, 2].map(|k| scene.params.high[k] - scene.params.low[k] + 2.0 * reach);
+pub fn params(
+    scene: &SceneParams,
+    reach: f32,
+    levels: Levels,
+    room: u32,
+    is_two_stage: bool,
+) -> OctreeParams {
+    let extents = [0, 1, 2].map(|k| scene.high[k] - scene.low[k] + 2.0 * reach);
     let least = extents.iter().fold(0.0f32, |a, &b| a.max(b)) / FLATTEST;
     OctreeParams {
-        low: scene.params.low.map(|x| x - reach),
-        triangles: scene.params.triangles,
+        low: scene.low.map(|x| x - reach),
+        triangles: scene.triangles,
         inverse: extents.map(|extent| (1u32 << levels.base) as f32 / extent.max(least)),
         base: levels.base,
         top: levels.top,
@@ -229,7 +235,7 @@ impl Octree {
         reach: f32,
         levels: Levels,
     ) -> Result<(), GpuError> {
-        let params = params(scene, reach, levels, self.room(), self.is_two_stage);
+        let params = params(&scene.params, reach, levels, self.room(), self.is_two_stage);
         self.grow_trees(recorder.gpu(), params.page)?;
         recorder.stage("counter tree");
         self.record_counts(recorder, scene, &params)?;
