@@ -23,6 +23,7 @@ mod context;
 mod error;
 mod frame;
 mod grid;
+mod octree;
 mod recorder;
 
 pub use adapters::{Adapter, AdapterChoice, adapters};
@@ -31,4 +32,5 @@ pub use context::{Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
 pub use grid::{GridGpu, GridOptions};
+pub use octree::{Levels, OctreeCounts, OctreeGpu, OctreeOptions, Thresholds};
 pub use recorder::{Answer, Recorder};
