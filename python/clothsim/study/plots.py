@@ -153,8 +153,8 @@ def _floor(axis: Any, study: Study, *, left: bool) -> None:
         return
     axis.axhspan(low * 1e-3, own, color=FAINT, alpha=0.16, lw=0, zorder=0)
     axis.text(
-        0.01 if left else 0.99, min(own, high), " the reference's own error ", transform=axis.get_yaxis_transform(), fontsize=8.5,
-        color=FAINT, ha="left" if left else "right", va="bottom" if own < 0.3 * high else "top",
+        0.01 if left else 0.99, min(own, high), "the reference's own error", transform=axis.get_yaxis_transform(),
+        fontsize=8.5, color=FAINT, ha="left" if left else "right", va="bottom" if own < 0.3 * high else "top",
     )  # fmt: skip
     axis.set_ylim(low, high)
 
