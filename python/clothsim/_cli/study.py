@@ -69,7 +69,12 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         "--patience", metavar="S", type=float, default=60.0, help="repeat a point only for so long [s] (default 60)"
     )
     parser.add_argument("--processes", metavar="N", type=count, help="runs side by side (default: one per core)")
-    parser.add_argument("--limit", metavar="S", type=float, help="stop a run after so many seconds; its point is kept")
+    parser.add_argument(
+        "--limit",
+        metavar="S",
+        type=float,
+        help="stop a run, its repeats included, after so many seconds; its point is kept",
+    )
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument("--resume", action="store_true", help="go on with an unfinished study in OUT, or start one")
     mode.add_argument("--overwrite", action="store_true", help="replace a study that OUT holds")
@@ -159,6 +164,6 @@ def execute(options: argparse.Namespace) -> int:
         text = json.dumps({**done, "resumed": "complete already"})
         print(text if options.json else f"{options.out}: complete already")
         return 0
-    print(json.dumps({"out": str(options.out), **done.facts()}) if options.json else tables.summary(done))
+    print(json.dumps({"out": str(options.out), **tables.facts(done)}) if options.json else tables.summary(done))
     no_reference = any(r.kind == "none" for _, r in done.references) and done.metric.needs_reference
     return 1 if no_reference or all(row.error is not None for row in done.rows) else 0

@@ -83,7 +83,7 @@ def run(
     processes : int, optional
         Most runs side by side; by default one per core.
     limit : float, optional
-        Stop a run after so many seconds; its point is kept with that as its error.
+        Stop a run, its repeats included, after so many seconds; its point is kept with that as its error.
     out : path, optional
         Folder for tables and plots; without it nothing is kept on disk.
     resume, overwrite, progress : bool

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -75,8 +76,9 @@ def _value(metric: Metric, states: Sequence[Any], reference: Reference) -> Value
         there = float(np.mean(exact)) if exact else reference.values.get(metric.name)
         error = None if there is None else abs(mean - there)
     own = reference.errors.get(metric.name) if metric.needs_reference else 0.0
-    resolved = error is not None and own is not None and error > _RESOLVED * own
-    return Value(mean, error, spread, resolved or not metric.needs_reference)
+    uncertain = 0.0 if spread is None else spread / math.sqrt(len(values))
+    resolved = error is not None and own is not None and error > _RESOLVED * (own + uncertain)
+    return Value(mean, error, spread, resolved or not metric.needs_reference, uncertain)
 
 
 def _why(metric: Metric, reference: Reference) -> str:
@@ -162,11 +164,15 @@ def _statement(made: Study) -> tuple[bool, list[str]]:
         lines.append(
             f"Its own error in {name} is {own:.2g} {unit}; {resolved} of {len(errors)} errors are above it twice."
         )
-        if resolved < 0.5 * len(errors):
+        if resolved < 0.5 * len(errors) and made.per_point > 1:
+            lines.append(f"{what}Most means differ by no more than they are uncertain by; more seeds would tell more.")
+        elif resolved < 0.5 * len(errors):
             converged = False
             lines.append(
                 f"{what}THE REFERENCE HAS NOT CONVERGED: most errors are no larger than its own. Refine further."
             )
+    if len(made.references) > 1:
+        lines.append("Every error is against the answer of its own problem; the front is over all of them.")
     failures = [r for r in made.rows if r.error is not None]
     if failures:
         lines.append(f"{len(failures)} of {len(made.rows)} points could not be run; the table says why.")

@@ -25,6 +25,7 @@ from clothsim.study.folder import StudyFolder, fingerprint
 from clothsim.study.metrics import Metric, metrics
 from clothsim.study.points import Settings, check_values, product
 from clothsim.study.reference import Reference, by_refinement, exact, failed
+from clothsim.study.resolution import counted
 from clothsim.study.result import COSTS, Study
 from clothsim.study.runner import Run, Runner
 
@@ -70,7 +71,12 @@ class Request:
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
         self.scene = scene
-        self.axes = [axis(n, v) for n, v in vary.items()] if isinstance(vary, Mapping) else list(vary)
+        self.fixed = dict(fixed or {})
+        self.base = based(scene, self.fixed)
+        axes = [axis(n, v) for n, v in vary.items()] if isinstance(vary, Mapping) else list(vary)
+        self.axes = [
+            axis(a.name, [counted(self.base, v) for v in a.values]) if a.key == "resolution" else a for a in axes
+        ]
         self.points = product(self.axes, sample, seed)
         names = [metric] if isinstance(metric, str) else list(metric or (["drape"] if seeds > 1 else ["rms"]))
         self.metrics = metrics(names)
@@ -86,8 +92,6 @@ class Request:
             )
         self.seeds, self.seed, self.disturbance = seeds, seed, float(disturbance)
         self.repeats, self.patience = repeats, float(patience)
-        self.fixed = dict(fixed or {})
-        self.base = based(scene, self.fixed)
         check_values(self.base, self.axes, self.points)
 
     @property

@@ -100,6 +100,9 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
         if known:
             style = "-" if along else ""
             axis.plot(*zip(*known, strict=True), style + mark, color=colour, ms=5.5, lw=1.2, alpha=0.85, label=name)
+        for r in rows:  # over seeds: what the mean is uncertain by
+            if (e := _error(study, r)) is not None and (own := r.values[study.metric.name].uncertain):
+                axis.plot([getattr(r, study.cost)] * 2, [max(e - own, 0.01 * e), e + own], color=colour, lw=1.2)
     best = [(float(getattr(r, study.cost)), e) for r in study.best() if (e := _error(study, r)) is not None]
     if best:
         axis.plot(*zip(*best, strict=True), "-", color=INK, lw=4.5, alpha=0.13, zorder=1, solid_capstyle="round")
@@ -115,8 +118,12 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
                 )  # fmt: skip
     _scales(axis, study)
     _floor(axis, study, left=True)
-    title = f"{study.metric.name} over {words}"
-    tidy(axis, title, f"{words} [{unit}]", f"{study.metric.name} [{study.metric.unit}]")
+    tidy(axis, f"{_what(study)} over {words}", f"{words} [{unit}]", f"{_what(study)} [{study.metric.unit}]")
+
+
+def _what(study: Study) -> str:
+    """What the upright axis shows."""
+    return ("error in " if study.metric.kind == "quantity" else "") + study.metric.name
 
 
 def _named(k: int, count: int) -> bool:
@@ -154,7 +161,7 @@ def _floor(axis: Any, study: Study, *, left: bool) -> None:
     axis.axhspan(low * 1e-3, own, color=FAINT, alpha=0.16, lw=0, zorder=0)
     axis.text(
         0.01 if left else 0.99, min(own, high), "the reference's own error", transform=axis.get_yaxis_transform(),
-        fontsize=8.5, color=FAINT, ha="left" if left else "right", va="bottom" if own < 0.3 * high else "top",
+        fontsize=8.5, color=FAINT, ha="left" if left else "right", va="bottom" if own < 2.5 * low else "top",
     )  # fmt: skip
     axis.set_ylim(low, high)
 
@@ -178,6 +185,8 @@ def _convergence(axis: Any, study: Study, along: Axis) -> None:
     _scales(axis, study)
     _floor(axis, study, left=along.refines > 0)
     title = "the same over " + ("the time step" if along.key == "time.dt" else along.name)
+    if len(orders) == 1:
+        title += f": order {next(iter(orders.values())):.1f}"
     unit = " [s]" if along.key == "time.dt" else ""
     tidy(axis, title, f"{along.name}{unit}", "")
 

@@ -23,6 +23,9 @@ __all__ = ["Reference", "by_refinement", "exact", "failed", "measure"]
 # Order of convergence in time, for the choice of a reference; among equals Newton's method first.
 _ORDERS = {"rk4": 4, "midpoint": 2, "implicit-newton": 1, "implicit-euler": 1, "semi-implicit": 1, "explicit-euler": 1}
 _FINER_TOLERANCE, _FLOOR = 0.1, 1e-14
+# The time step of the reference, and of the run that tells its error, over the finest of the study: for a method of
+# first order the finest point is then off by three times the reference's own error.
+_FINER_STEP, _BEFORE = 0.25, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,10 +99,10 @@ def by_refinement(
 ) -> Reference:
     """Run a problem finer than every point of the study, and again without each refinement.
 
-    Along every varied axis that refines, the reference is one step beyond the finest value: half the time step, a tenth
-    of the tolerance, twice the cells. Its own error is estimated by how far each of these steps moved it, summed: for a
-    method of first order and a factor of two that is the error that is left, for higher orders it is more than that.
-    Where no such axis is varied the time step is refined.
+    Along every varied axis that refines, the reference lies beyond the finest value: a quarter of the time step, a
+    tenth of the tolerance, twice the cells. Its own error is estimated by how far the last halving (or tenth) moved it,
+    summed over the axes: for a method of first order and a factor of two that is the error that is left, for higher
+    orders it is more than that. Where no such axis is varied the time step is refined.
     """
     reasons = []
     for settings, before in _candidates(runner, problem, axes):
@@ -138,7 +141,7 @@ def _candidates(runner: Runner, problem: Settings, axes: Sequence[Axis]) -> list
                 except ClothSimError:
                     continue
         settings.update(steps)
-        before = {name: {**settings, name: finest[name]} for name in steps}
+        before = {a.name: {**settings, a.name: _before(a, finest)} for a in all_axes if a.name in steps}
         chosen.append((settings, before))
     return chosen
 
@@ -163,7 +166,12 @@ def _finer(runner: Runner, a: Axis, finest: Settings) -> Any:
     if a.key == "resolution":
         return refined(runner.built(finest).data)
     value = float(finest[a.name])
-    return value / 2.0 if a.key == "time.dt" else max(_FINER_TOLERANCE * value, _FLOOR)
+    return _FINER_STEP * value if a.key == "time.dt" else max(_FINER_TOLERANCE * value, _FLOOR)
+
+
+def _before(a: Axis, finest: Settings) -> Any:
+    """The value that the last refinement of the reference began from."""
+    return _BEFORE * float(finest[a.name]) if a.key == "time.dt" else finest[a.name]
 
 
 def _judged(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import re
 from typing import Any
 
 from clothsim.errors import InvalidInput
 
-__all__ = ["cells", "refined", "set_resolution"]
+__all__ = ["counted", "refined", "set_resolution"]
 
 # What counts the cells of a generated mesh: the first key is the one that a resolution names. Vertices where True.
 _COUNTS = {
@@ -76,11 +77,15 @@ def _moved(vertex: int, before: list[int], after: list[int], cloth: int, generat
     )
 
 
-def cells(data: dict[str, Any]) -> int:
-    """Cells along the first cloth, the number that a resolution changes."""
-    mesh = data["cloth"][0]["mesh"]
-    keys, vertices = _COUNTS[mesh["generator"]]
-    return int(mesh[keys[0]]) - vertices
+def counted(data: dict[str, Any], value: Any) -> Any:
+    """A resolution as a number; what is none stays as it is, to be refused where it is used."""
+    made = copy.deepcopy(data)
+    try:
+        set_resolution(made, value)
+    except InvalidInput:
+        return value
+    mesh = made["cloth"][0]["mesh"]
+    return int(mesh[_COUNTS[mesh["generator"]][0][0]])
 
 
 def refined(data: dict[str, Any]) -> int:

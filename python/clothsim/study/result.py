@@ -35,17 +35,26 @@ class Value:
     spread : float or None
         Standard deviation over seeds.
     resolved : bool
-        The error is more than twice the reference's own.
+        The error is more than twice what the reference and the value are uncertain by.
+    uncertain : float
+        Standard error of the mean over seeds.
     """
 
     value: float | None
     error: float | None
     spread: float | None = None
     resolved: bool = True
+    uncertain: float = 0.0
 
     def facts(self) -> dict[str, Any]:
         """For JSON."""
-        return {"value": self.value, "error": self.error, "spread": self.spread, "resolved": self.resolved}
+        return {
+            "value": self.value,
+            "error": self.error,
+            "spread": self.spread,
+            "resolved": self.resolved,
+            "uncertain": self.uncertain,
+        }
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from clothsim.study.points import label
 from clothsim.study.quantities import amount
 from clothsim.study.result import COSTS, Row, Study
 
-__all__ = ["csv_text", "json_text", "markdown", "summary"]
+__all__ = ["csv_text", "facts", "json_text", "markdown", "summary"]
 
 
 def csv_text(study: Study) -> str:
@@ -48,9 +48,14 @@ def _cell(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+def facts(study: Study) -> dict[str, Any]:
+    """Everything, with nothing that JSON does not hold."""
+    return dict(_finite(study.facts()))
+
+
 def json_text(study: Study) -> str:
     """Everything."""
-    return json.dumps(_finite(study.facts()), indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(facts(study), indent=1, ensure_ascii=False) + "\n"
 
 
 def _finite(value: Any) -> Any:
@@ -95,8 +100,8 @@ def markdown(study: Study) -> str:
         lines += [f"| {o.axis} | {label(o.settings) or '–'} | {o.order:.2f} |" for o in study.orders]
     lines += ["", "## All points", ""]
     lines += _table(study, [("●" if k in study.front else "", row) for k, row in enumerate(study.rows)])
-    facts = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in study.machine.items() if v is not None)
-    lines += ["", f"{len(study.rows)} points of {study.duration:g} s in {study.seconds:.0f} s. {facts}."]
+    where = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in study.machine.items() if v is not None)
+    lines += ["", f"{len(study.rows)} points of {study.duration:g} s in {study.seconds:.0f} s. {where}."]
     return "\n".join(lines) + "\n"
 
 

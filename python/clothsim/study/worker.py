@@ -135,7 +135,7 @@ def _observe(simulation: Simulation, steps: int, duration: float, data: dict[str
     arrays["collider_end"] = simulation.collider_positions
     arrays["times"] = np.array(times)
     arrays["energies"] = np.array([[e[k] for k in sorted(e)] for e in energies])
-    report = simulation.report
+    report = json.loads(simulation._core.summary())  # not `report`: its tables of all steps would count as memory
     totals = {k: n for k, n in report["totals"].items() if isinstance(n, (int, float)) or n is None}
     facts = {
         "totals": totals,
@@ -175,7 +175,8 @@ def _die_with_parent() -> None:
     """End when the parent does, however it ends: its end of the pipe closes."""
 
     def watch() -> None:
-        sys.stdin.buffer.read()
+        while os.read(0, 4096):  # not through sys.stdin, whose lock would outlive the interpreter
+            pass
         os._exit(3)
 
     threading.Thread(target=watch, daemon=True).start()
