@@ -294,6 +294,8 @@ def test_orders_leave_out_what_the_reference_cannot_tell() -> None:
     assert pareto.order(errors, 0.0) == pytest.approx(2.0)
     assert pareto.order({**errors, 0.0125: 1e-3}, 1e-4) == pytest.approx(2.0)
     assert pareto.order({0.1: 1.0}, 0.0) is None
+    rough = {0.2: 0.5, 0.1: 0.125, 0.05: 0.125 / 4, 0.025: 0.125 / 16, 0.0125: 0.125 / 17}
+    assert pareto.order(rough, 0.0) == pytest.approx(2.0), "one plateau does not decide"
 
 
 def test_numbers_with_units() -> None:
@@ -462,6 +464,10 @@ def test_the_command_writes_tables_and_plots_and_refuses_a_second_study(tmp_path
     assert [float(r["rms"]) for r in rows] == pytest.approx(
         [r["values"]["rms"]["value"] for r in facts["rows"]], rel=1e-5
     )
+    read = cs.study.load(out)
+    assert [row.facts() for row in read.rows] == facts["rows"] and [o.facts() for o in read.orders] == facts["orders"]
+    with pytest.raises(cs.InvalidInput, match="expected the file of a study"):
+        cs.study.load(tmp_path)
     page = (out / "study.md").read_text()
     assert "the reference is the run at rk4, dt 0.000125" in page and "study.png" in page
     before = (out / "study.json").read_bytes()

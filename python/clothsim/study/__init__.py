@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from clothsim.study.result import Study
     from clothsim.study.tuning import Tuned
 
-__all__ = ["axis_names", "metric_names", "run", "tune"]
+__all__ = ["axis_names", "load", "metric_names", "run", "tune"]
 
 
 def axis_names() -> dict[str, str]:
@@ -34,6 +34,19 @@ def metric_names() -> list[str]:
     from clothsim.study.metrics import METRICS
 
     return list(METRICS)
+
+
+def load(folder: str | os.PathLike[str]) -> Study:
+    """Read a study that was written into a folder, for plots and tables of your own.
+
+    Raises
+    ------
+    InvalidInput
+        There is none.
+    """
+    from clothsim.study.loading import load as read
+
+    return read(folder)
 
 
 def run(

@@ -20,7 +20,7 @@ from clothsim.study.runner import Run
 if TYPE_CHECKING:
     from clothsim.study.job import Request
 
-__all__ = ["row", "study"]
+__all__ = ["orders", "row", "study"]
 
 # An error is resolved if it is more than this many times the reference's own.
 _RESOLVED = 2.0
@@ -47,11 +47,11 @@ def row(settings: Settings, runs: Sequence[Run], metrics: Sequence[Metric], refe
             if n is not None and key != "wall_seconds":
                 totals[key] = max(totals.get(key, 0), n) if key.startswith("max") else totals.get(key, 0) + n
     if totals.get("retries"):
-        notes.append(f"{totals['retries']} steps were retried with a smaller step")
+        notes.append(f"steps retried with a smaller one: {totals['retries']}")
     if totals.get("not_converged"):
-        notes.append(f"{totals['not_converged']} steps met a cap before their tolerance")
+        notes.append(f"steps that met a cap before their tolerance: {totals['not_converged']}")
     if found := max(run.facts["intersections"] for run in runs):
-        notes.append(f"{found} pairs of triangles pass through each other at the end")
+        notes.append(f"pairs of triangles that pass through each other at the end: {found}")
     totals["disturbed"] = sum(run.facts["disturbed"] for run in runs)
     if any(run.facts.get("repeatable") is False for run in runs):
         notes.append("repeats did not end with the same bits")
@@ -110,11 +110,11 @@ def study(
     chosen = pareto.front([c for _, c, _ in known], [e for _, _, e in known])
     converged, statement = _statement(made)
     return replace(
-        made, front=[known[k][0] for k in chosen], orders=_orders(made), converged=converged, statement=statement
+        made, front=[known[k][0] for k in chosen], orders=orders(made), converged=converged, statement=statement
     )
 
 
-def _orders(made: Study) -> list[Order]:
+def orders(made: Study) -> list[Order]:
     """Order along each axis that refines, where all other settings are equal."""
     name, out = made.metric.name, []
     for axis in made.axes:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 
-__all__ = ["front", "order"]
+__all__ = ["front", "order", "slopes"]
 
 # What an error has to be of that of all cheaper points.
 _GAIN = 0.99
-# Values that a fit of an order takes at most, from the finest.
-_MOST = 3
 # Steps nearer to each other than by this factor say too little about a slope.
 _APART = 1.4
 
@@ -27,7 +27,7 @@ def front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
 
 
 def order(errors: Mapping[float, float], floor: float) -> float | None:
-    """Slope of log(error) over log(step), by least squares over the finest three values that can be trusted.
+    """Median of the slopes of log(error) over log(step) between neighbouring steps whose errors can be trusted.
 
     Parameters
     ----------
@@ -40,8 +40,9 @@ def order(errors: Mapping[float, float], floor: float) -> float | None:
     for h, e in sorted(errors.items()):
         if e > 10.0 * floor and e > 0.0 and (not good or h > _APART * good[-1][0]):
             good.append((h, e))
-    good = good[:_MOST]
-    if len(good) < 2:
-        return None
-    h, e = np.log(np.array(good)).T
-    return float(np.polyfit(h, e, 1)[0])
+    return float(np.median(slopes(good))) if len(good) > 1 else None
+
+
+def slopes(points: Sequence[tuple[float, float]]) -> list[float]:
+    """Slopes between neighbours, both axes logarithmic."""
+    return [math.log(e2 / e1) / math.log(h2 / h1) for (h1, e1), (h2, e2) in pairwise(points)]

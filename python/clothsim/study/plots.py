@@ -8,6 +8,7 @@ from typing import Any
 from clothsim._arrays import optional
 from clothsim.reproduce.pictures import FAINT, INK, figure, tidy
 from clothsim.study.axes import Axis, value_text
+from clothsim.study.pareto import slopes
 from clothsim.study.points import label
 from clothsim.study.quantities import amount
 from clothsim.study.result import COSTS, Row, Study
@@ -192,8 +193,12 @@ def _convergence(axis: Any, study: Study, along: Axis) -> None:
 
 
 def _guide(axis: Any, points: list[tuple[float, float]], slope: int) -> None:
-    """A dotted line of a whole order beside the finest points of a series, finest first."""
-    (finest, error), coarsest = points[0], points[min(3, len(points) - 1)][0]
+    """A dotted line of a whole order beside a series, finest point first, where its slope is nearest to that."""
+    if len(points) < 2:
+        return
+    off = [abs(s - slope) for s in slopes(points)]
+    at = off.index(min(off))
+    (finest, error), coarsest = points[at], points[min(at + 2, len(points) - 1)][0]
     apart = 0.45
     end = apart * error * (coarsest / finest) ** slope
     axis.plot([finest, coarsest], [apart * error, end], ":", color=INK, lw=1.3, zorder=0)
