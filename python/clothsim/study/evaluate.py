@@ -24,6 +24,8 @@ __all__ = ["orders", "row", "study"]
 
 # An error is resolved if it is more than this many times the reference's own.
 _RESOLVED = 2.0
+# Axes along which errors have an order.
+_MESH_AND_STEP = ("time.dt", "resolution")
 # Wall-clock over processor time of one thread, from which on a machine counts as busy.
 _BUSY = 1.1
 
@@ -115,10 +117,10 @@ def study(
 
 
 def orders(made: Study) -> list[Order]:
-    """Order along each axis that refines, where all other settings are equal."""
+    """Order along the time step and the resolution, where all other settings are equal."""
     name, out = made.metric.name, []
     for axis in made.axes:
-        if not axis.refines or not axis.is_number or len(axis.values) < 2 or made.per_point > 1:
+        if axis.key not in _MESH_AND_STEP or not axis.is_number or len(axis.values) < 2 or made.per_point > 1:
             continue
         groups: dict[str, tuple[Settings, dict[float, float], float]] = {}
         for r in made.rows:

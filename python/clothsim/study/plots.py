@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from typing import Any
 
 from clothsim._arrays import optional
@@ -49,6 +50,8 @@ def _note(study: Study) -> str:
     fixed = ", ".join(f"{k} = {value_text(v)}" for k, v in study.fixed.items())
     parts = [f"{study.duration:g} s simulated" + (f" with {fixed}" if fixed else "")]
     parts.append(f"{where['processor']}, one process per core, medians")
+    if any(not v.resolved for row in study.rows for k, v in row.values.items() if k == study.metric.name):
+        parts.append("hollow: no larger than twice the reference's own error")
     if not study.converged:
         parts.append("THE REFERENCE IS NOT CONVERGED")
     return "; ".join(parts)
@@ -101,6 +104,7 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
         if known:
             style = "-" if along else ""
             axis.plot(*zip(*known, strict=True), style + mark, color=colour, ms=5.5, lw=1.2, alpha=0.85, label=name)
+        _hollow(axis, study, rows, colour, mark, lambda r: getattr(r, study.cost))
         for r in rows:  # over seeds: what the mean is uncertain by
             if (e := _error(study, r)) is not None and (own := r.values[study.metric.name].uncertain):
                 axis.plot([getattr(r, study.cost)] * 2, [max(e - own, 0.01 * e), e + own], color=colour, lw=1.2)
@@ -125,6 +129,13 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
 def _what(study: Study) -> str:
     """What the upright axis shows."""
     return ("error in " if study.metric.kind == "quantity" else "") + study.metric.name
+
+
+def _hollow(axis: Any, study: Study, rows: list[Row], colour: str, mark: str, at: Callable[[Row], float]) -> None:
+    """Points whose error the reference cannot tell."""
+    for r in rows:
+        if (e := _error(study, r)) is not None and not r.values[study.metric.name].resolved and at(r):
+            axis.plot([at(r)], [e], mark, mfc="white", mec=colour, ms=5.5, zorder=3)
 
 
 def _named(k: int, count: int) -> bool:
@@ -155,6 +166,8 @@ def _scales(axis: Any, study: Study) -> None:
 
 def _floor(axis: Any, study: Study, *, left: bool) -> None:
     """Shade what lies within the reference's own error; its name stands at the left or the right."""
+    if len(study.references) > 1:
+        return
     own = max((r.errors.get(study.metric.name) or 0.0 for _, r in study.references), default=0.0)
     low, high = axis.get_ylim()
     if own <= low or not any(_error(study, row) for row in study.rows):
@@ -177,6 +190,7 @@ def _convergence(axis: Any, study: Study, along: Axis) -> None:
             continue
         _, colour, mark, rows = series
         axis.plot(*zip(*known, strict=True), "-" + mark, color=colour, ms=5.5, lw=1.2, alpha=0.85)
+        _hollow(axis, study, rows, colour, mark, lambda r: float(r.settings[along.name]))
         order = orders.get(label(rows[0].settings, others))
         if order is not None and order > 0.5 and round(order) not in guided:
             guided.add(round(order))
