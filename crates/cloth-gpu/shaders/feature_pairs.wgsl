@@ -1,10 +1,11 @@
 // Vertex-triangle and edge-edge candidates of the triangle pairs. Each vertex and edge is tested by the one triangle that owns it
-// (R-triangles: Curtis et al. 2008), so a pair of features comes up once; features whose boxes stay apart are dropped.
+// (R-triangles: Curtis et al. 2008), so a pair of features comes up once; features whose boxes stay apart are dropped, and with DOPS
+// triangles and features whose 18-DOPs do.
 //   in   pairs[p]         p < min(room, status[STATUS_TRIANGLE_PAIRS])
 //        triangles[t]     corners; features[t]: edges 01, 12, 20, and the features it owns (bits 0..2 corners, 3..5 edges)
 //        positions, active_bits: as in triangle_bounds
 //   out  vertex_triangle, edge_edge: unordered; what does not fit is counted in the status and left out
-// Includes: layout, boxes.   Twin: src/twin/features.rs
+// Includes: layout, boxes, dops (DOPS).   Twin: src/twin/features.rs
 @group(0) @binding(0) var<uniform> params: SceneParams;
 @group(0) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> features: array<vec4<u32>>;
@@ -26,10 +27,33 @@ fn corner_box(vertex: u32) -> Box {
     return vertex_box(positions[vertex], positions[params.second + vertex]);
 }
 
+//#if DOPS
+fn corner_dop(vertex: u32) -> Dop {
+    return vertex_dop(positions[vertex].xyz, positions[params.second + vertex].xyz);
+}
+
+fn whole_dop(a: ptr<function, Side>) -> Dop {
+    var x = (*a).dops[0];
+    var y = (*a).dops[1];
+    var z = (*a).dops[2];
+    var xy = dop_hull(&x, &y);
+    return dop_hull(&xy, &z);
+}
+
+fn edge_dop(a: ptr<function, Side>, first: u32, last: u32) -> Dop {
+    var x = (*a).dops[first];
+    var y = (*a).dops[last];
+    return dop_hull(&x, &y);
+}
+//#end
+
 struct Side {
     corners: vec3<u32>,
     features: vec4<u32>,
     boxes: array<Box, 3>,
+//#if DOPS
+    dops: array<Dop, 3>,
+//#end
     // Bit per corner.
     is_active: u32,
 }
@@ -40,6 +64,9 @@ fn side(t: u32) -> Side {
         corners,
         features[t],
         array<Box, 3>(corner_box(corners.x), corner_box(corners.y), corner_box(corners.z)),
+//#if DOPS
+        array<Dop, 3>(corner_dop(corners.x), corner_dop(corners.y), corner_dop(corners.z)),
+//#end
         u32(is_active(corners.x)) | (u32(is_active(corners.y)) << 1u) | (u32(is_active(corners.z)) << 2u),
     );
 }
@@ -47,11 +74,18 @@ fn side(t: u32) -> Side {
 // Bit per corner of a: owned by it, no corner of b, and near b.
 fn vertices_near(a: ptr<function, Side>, b: ptr<function, Side>) -> u32 {
     let whole = hull(hull((*b).boxes[0], (*b).boxes[1]), (*b).boxes[2]);
+//#if DOPS
+    var other = whole_dop(b);
+//#end
     var near = 0u;
     for (var k = 0u; k < 3u; k++) {
         let is_owned = (((*a).features.w >> k) & 1u) != 0u;
         let is_live = (((*a).is_active >> k) & 1u) != 0u || (*b).is_active != 0u;
         if is_owned && is_live && all(vec3<u32>((*a).corners[k]) != (*b).corners) && may_touch((*a).boxes[k], whole) {
+//#if DOPS
+            var own = (*a).dops[k];
+            if !dops_may_touch(&own, &other, params.thickness) { continue; }
+//#end
             near |= 1u << k;
         }
     }
@@ -73,6 +107,11 @@ fn edges_near(a: ptr<function, Side>, b: ptr<function, Side>) -> u32 {
             let is_owned = (((*b).features.w >> (3u + j)) & 1u) != 0u && (a_active | b_active) != 0u;
             let is_apart = all(vec2<u32>((*a).corners[i]) != ends) && all(vec2<u32>((*a).corners[i_end]) != ends);
             if is_owned && is_apart && may_touch(box_a, hull((*b).boxes[j], (*b).boxes[j_end])) {
+//#if DOPS
+                var dop_a = edge_dop(a, i, i_end);
+                var dop_b = edge_dop(b, j, j_end);
+                if !dops_may_touch(&dop_a, &dop_b, params.thickness) { continue; }
+//#end
                 near |= 1u << (3u * i + j);
             }
         }
@@ -101,8 +140,16 @@ fn feature_pairs(
         pair = pairs[p];
         a = side(pair.x);
         b = side(pair.y);
-        vertices = vertices_near(&a, &b) | (vertices_near(&b, &a) << 3u);
-        edges = edges_near(&a, &b);
+        var is_near = true;
+//#if DOPS
+        var dop_a = whole_dop(&a);
+        var dop_b = whole_dop(&b);
+        is_near = dops_may_touch(&dop_a, &dop_b, params.thickness);
+//#end
+        if is_near {
+            vertices = vertices_near(&a, &b) | (vertices_near(&b, &a) << 3u);
+            edges = edges_near(&a, &b);
+        }
         if vertices != 0u { place.x = atomicAdd(&sh_counts[0], countOneBits(vertices)); }
         if edges != 0u { place.y = atomicAdd(&sh_counts[1], countOneBits(edges)); }
     }

@@ -17,16 +17,22 @@ pub mod limits;
 pub mod stages;
 pub mod twin;
 
+pub mod chunks;
+
 mod buffers;
 mod context;
 mod error;
 mod frame;
 mod grid;
 mod recorder;
+mod seconds;
+mod tail;
 
 pub use buffers::{Array, Length};
 pub use context::{AdapterChoice, Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
-pub use grid::{GridGpu, GridOptions};
+pub use grid::{Distribution, Duplicates, GridGpu, GridOptions};
 pub use recorder::{Answer, Recorder};
+pub use seconds::Seconds;
+pub use tail::{Tail, TailCounts};

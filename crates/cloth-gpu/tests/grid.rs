@@ -225,8 +225,13 @@ fn small_room_and_small_portions_change_nothing() {
             (Some(50), Some(1000), Some(5000)),
         ] {
             for subdivision in [None, Some(1.2)] {
-                let options =
-                    GridOptions { subdivision, first_capacity: first, max_capacity: most, max_tests: tests };
+                let options = GridOptions {
+                    subdivision,
+                    first_capacity: first,
+                    max_capacity: most,
+                    max_tests: tests,
+                    ..GridOptions::default()
+                };
                 let mut grid = GridGpu::with_options(device.gpu.clone(), &mesh, options).unwrap();
                 assert!(compare(&mut grid, &mesh, &query, &format!("{options:?}")) > 1000);
             }

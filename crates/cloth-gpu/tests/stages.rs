@@ -62,14 +62,14 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> Run {
     let mut scene = Scene::new(gpu, mesh).unwrap();
     scene.upload(gpu, query, &frame);
     let mut cells = Cells::new(gpu, n as u32, 8 * n).unwrap();
-    let mut pairs = Pairs::new(gpu, room).unwrap();
-    let features = Features::new(gpu, room).unwrap();
+    let mut pairs = Pairs::new(gpu, room, false).unwrap();
+    let features = Features::new(gpu, room, true).unwrap();
     let mut recorder = Recorder::new(gpu);
     scene.record(&mut recorder);
     cells.record_setup(&mut recorder, &scene);
     cells.record(&mut recorder, scene.registered(), &scene.spheres, 32).unwrap();
     pairs.record_counts(&mut recorder, &cells).unwrap();
-    pairs.record_tests(&mut recorder, &scene, &cells, 0, tests);
+    pairs.record_tests(&mut recorder, &scene, &cells, 0, tests).unwrap();
     features.record(&mut recorder, &scene, &pairs.found, room as u32);
     let r = &mut recorder;
     let copies = [
@@ -191,6 +191,7 @@ fn difference(r: &Run) -> Option<&'static str> {
         &r.positions,
         &r.active,
         &r.pairs,
+        Some(twin::dops::SLACK),
     );
     if sorted(vertex_triangle) != sorted(r.vertex_triangle.clone()) {
         return Some("vertex-triangle candidates");

@@ -1,6 +1,6 @@
 //! From registrations to triangle pairs whose boxes overlap: counts, sums, tests.
 
-use crate::buffers::Array;
+use crate::buffers::{Array, Length};
 use crate::context::Gpu;
 use crate::error::GpuError;
 use crate::kernel::{Kernel, Source};
@@ -18,6 +18,7 @@ pub struct Pairs {
     count: Arc<Kernel>,
     test: Arc<Kernel>,
     scan: Scan<[u32; 2]>,
+    owners: Option<Owners>,
     /// Tests that each registration begins.
     pub counts: Array<u32>,
     /// Tests before each registration, (low, high), and their number.
@@ -26,27 +27,53 @@ pub struct Pairs {
     pub found: Array<[u32; 2]>,
 }
 
-/// The texts of both kernels: count, test.
-pub fn sources() -> [Source; 2] {
-    [
-        Source::new("pairs_count", include_str!("../../shaders/pairs_count.wgsl")),
+/// The registration that begins each test, by a scan over the tests.
+#[derive(Debug)]
+struct Owners {
+    mark: Arc<Kernel>,
+    scan: Scan<u32>,
+    /// How many registrations later each test begins than the one before.
+    marks: Array<u32>,
+    /// Sums of the marks.
+    scanned: Array<u32>,
+}
+
+/// The texts of the kernels: count, test, test by owners, owners.
+pub fn sources() -> [Source; 4] {
+    let test = || {
         Source::new("pairs_test", include_str!("../../shaders/pairs_test.wgsl"))
             .include(include_str!("../../shaders/boxes.wgsl"))
-            .include(include_str!("../../shaders/control.wgsl")),
+            .include(include_str!("../../shaders/control.wgsl"))
+    };
+    [
+        Source::new("pairs_count", include_str!("../../shaders/pairs_count.wgsl")),
+        test(),
+        test().switch("OWNERS", true),
+        Source::new("pairs_owners", include_str!("../../shaders/pairs_owners.wgsl")),
     ]
 }
 
 impl Pairs {
-    /// Builds the pipelines; room for `capacity` pairs.
+    /// Builds the pipelines; room for `capacity` pairs. `by_scan`: tests find the registrations that begin them by a scan over all
+    /// tests of a portion, else by binary search.
     ///
     /// # Errors
     /// [`GpuError::Shader`], [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
-    pub fn new(gpu: &Gpu, capacity: usize) -> Result<Self, GpuError> {
-        let [count, test] = sources();
+    pub fn new(gpu: &Gpu, capacity: usize, by_scan: bool) -> Result<Self, GpuError> {
+        let [count, test, test_by_owners, mark] = sources();
+        let owners = || {
+            Ok::<_, GpuError>(Owners {
+                mark: mark.kernel(gpu)?,
+                scan: Scan::new(gpu)?,
+                marks: Array::new(gpu, "steps between owners", 1)?,
+                scanned: Array::new(gpu, "owners of the tests", 2)?,
+            })
+        };
         Ok(Self {
             count: count.kernel(gpu)?,
-            test: test.kernel(gpu)?,
+            test: if by_scan { test_by_owners } else { test }.kernel(gpu)?,
             scan: Scan::new(gpu)?,
+            owners: if by_scan { Some(owners()?) } else { None },
             counts: Array::new(gpu, "tests per registration", 1)?,
             sums: Array::new(gpu, "tests before each registration", 1)?,
             found: Array::new(gpu, "triangle pairs", capacity)?,
@@ -70,16 +97,19 @@ impl Pairs {
     }
 
     /// Records `count` tests from `start` on.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
     pub fn record_tests(
-        &self,
+        &mut self,
         recorder: &mut Recorder<'_>,
         scene: &Scene,
         cells: &Cells,
         start: u64,
         count: u32,
-    ) {
+    ) -> Result<(), GpuError> {
+        let gpu = recorder.gpu();
         let n = cells.length();
-        recorder.stage("triangle pairs");
         let params = PairParams {
             most: n.most,
             word: n.index(),
@@ -88,19 +118,32 @@ impl Pairs {
             count,
             ..Default::default()
         };
-        let arrays = [
-            n.buffer(recorder.gpu()),
+        if let Some(Owners { mark, scan, marks, scanned }) = &mut self.owners {
+            marks.grow(gpu, count as usize)?;
+            scanned.grow(gpu, count as usize + 1)?;
+            recorder.clear(marks, 0..count.into());
+            recorder.stage("owners of tests");
+            let arrays = [n.buffer(gpu), &self.sums.raw, &marks.raw];
+            recorder.dispatch(mark, &params, &arrays, n.most.div_ceil(WORKGROUP));
+            scan.record(recorder, marks, Length::host(count), scanned)?;
+        }
+        recorder.stage("triangle pairs");
+        let mut arrays = vec![
+            n.buffer(gpu),
             &self.sums.raw,
             &cells.entries.raw,
             &scene.bounds.raw,
             &self.found.raw,
             &scene.status.raw,
         ];
+        arrays.extend(self.owners.iter().map(|owners| &owners.scanned.raw));
         recorder.dispatch(&self.test, &params, &arrays, count.div_ceil(PAIR_BLOCK));
+        Ok(())
     }
 
     /// Memory [B].
     pub fn bytes(&self) -> u64 {
-        self.counts.bytes() + self.sums.bytes() + self.found.bytes()
+        let owners = self.owners.as_ref().map_or(0, |o| o.marks.bytes() + o.scanned.bytes());
+        self.counts.bytes() + self.sums.bytes() + self.found.bytes() + owners
     }
 }
