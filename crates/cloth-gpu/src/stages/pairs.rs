@@ -4,7 +4,7 @@ use crate::buffers::{Array, Length};
 use crate::context::Gpu;
 use crate::error::GpuError;
 use crate::kernel::{Kernel, Source};
-use crate::layout::{LengthParams, PairParams};
+use crate::layout::{Entry, LengthParams, PairParams};
 use crate::limits::{PAIR_BLOCK, WORKGROUP};
 use crate::recorder::Recorder;
 use crate::stages::bounds::Scene;
@@ -16,7 +16,8 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub struct Pairs {
     count: Arc<Kernel>,
-    test: Arc<Kernel>,
+    /// By control bits, by tokens.
+    test: [Arc<Kernel>; 2],
     scan: Scan<[u32; 2]>,
     owners: Option<Owners>,
     /// Tests that each registration begins.
@@ -38,17 +39,43 @@ struct Owners {
     scanned: Array<u32>,
 }
 
-/// The texts of the kernels: count, test, test by owners, owners.
-pub fn sources() -> [Source; 4] {
-    let test = || {
+/// Registrations whose pairs are tested.
+#[derive(Debug, Clone, Copy)]
+pub struct Entries<'a> {
+    /// Sorted by key.
+    pub entries: &'a Array<Entry>,
+    /// How many.
+    pub length: Length<'a>,
+    /// Which of several cells tests a pair: told by tokens (`octree_token.wgsl`), else by control bits.
+    pub has_tokens: bool,
+}
+
+impl<'a> From<&'a Cells> for Entries<'a> {
+    fn from(cells: &'a Cells) -> Self {
+        Self { entries: &cells.entries, length: cells.length(), has_tokens: false }
+    }
+}
+
+/// The texts of the kernels: count, tests by control bits and by tokens, both by owners, owners.
+pub fn sources() -> [Source; 6] {
+    let test = |tokens: bool, owners: bool| {
+        let duplicates = if tokens {
+            include_str!("../../shaders/octree_token.wgsl")
+        } else {
+            include_str!("../../shaders/control.wgsl")
+        };
         Source::new("pairs_test", include_str!("../../shaders/pairs_test.wgsl"))
             .include(include_str!("../../shaders/boxes.wgsl"))
-            .include(include_str!("../../shaders/control.wgsl"))
+            .include(duplicates)
+            .switch("TOKEN", tokens)
+            .switch("OWNERS", owners)
     };
     [
         Source::new("pairs_count", include_str!("../../shaders/pairs_count.wgsl")),
-        test(),
-        test().switch("OWNERS", true),
+        test(false, false),
+        test(true, false),
+        test(false, true),
+        test(true, true),
         Source::new("pairs_owners", include_str!("../../shaders/pairs_owners.wgsl")),
     ]
 }
@@ -60,7 +87,8 @@ impl Pairs {
     /// # Errors
     /// [`GpuError::Shader`], [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
     pub fn new(gpu: &Gpu, capacity: usize, by_scan: bool) -> Result<Self, GpuError> {
-        let [count, test, test_by_owners, mark] = sources();
+        let [count, by_control, by_token, by_control_owners, by_token_owners, mark] = sources();
+        let test = if by_scan { [by_control_owners, by_token_owners] } else { [by_control, by_token] };
         let owners = || {
             Ok::<_, GpuError>(Owners {
                 mark: mark.kernel(gpu)?,
@@ -71,7 +99,7 @@ impl Pairs {
         };
         Ok(Self {
             count: count.kernel(gpu)?,
-            test: if by_scan { test_by_owners } else { test }.kernel(gpu)?,
+            test: [test[0].kernel(gpu)?, test[1].kernel(gpu)?],
             scan: Scan::new(gpu)?,
             owners: if by_scan { Some(owners()?) } else { None },
             counts: Array::new(gpu, "tests per registration", 1)?,
@@ -84,14 +112,18 @@ impl Pairs {
     ///
     /// # Errors
     /// [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
-    pub fn record_counts(&mut self, recorder: &mut Recorder<'_>, cells: &Cells) -> Result<(), GpuError> {
+    pub fn record_counts<'a>(
+        &mut self,
+        recorder: &mut Recorder<'_>,
+        cells: impl Into<Entries<'a>>,
+    ) -> Result<(), GpuError> {
         let gpu = recorder.gpu();
-        let n = cells.length();
+        let Entries { entries, length: n, .. } = cells.into();
         self.counts.grow(gpu, n.most as usize)?;
         self.sums.grow(gpu, n.most as usize + 1)?;
         recorder.stage("workload");
         let params = LengthParams { most: n.most, word: n.index(), ..Default::default() };
-        let arrays = [n.buffer(gpu), &cells.entries.raw, &self.counts.raw];
+        let arrays = [n.buffer(gpu), &entries.raw, &self.counts.raw];
         recorder.dispatch(&self.count, &params, &arrays, n.most.div_ceil(WORKGROUP));
         self.scan.record(recorder, &self.counts, n, &self.sums)
     }
@@ -100,16 +132,16 @@ impl Pairs {
     ///
     /// # Errors
     /// [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
-    pub fn record_tests(
+    pub fn record_tests<'a>(
         &mut self,
         recorder: &mut Recorder<'_>,
         scene: &Scene,
-        cells: &Cells,
+        cells: impl Into<Entries<'a>>,
         start: u64,
         count: u32,
     ) -> Result<(), GpuError> {
         let gpu = recorder.gpu();
-        let n = cells.length();
+        let Entries { entries, length: n, has_tokens } = cells.into();
         let params = PairParams {
             most: n.most,
             word: n.index(),
@@ -131,13 +163,14 @@ impl Pairs {
         let mut arrays = vec![
             n.buffer(gpu),
             &self.sums.raw,
-            &cells.entries.raw,
+            &entries.raw,
             &scene.bounds.raw,
             &self.found.raw,
             &scene.status.raw,
         ];
         arrays.extend(self.owners.iter().map(|owners| &owners.scanned.raw));
-        recorder.dispatch(&self.test, &params, &arrays, count.div_ceil(PAIR_BLOCK));
+        let test = &self.test[usize::from(has_tokens)];
+        recorder.dispatch(test, &params, &arrays, count.div_ceil(PAIR_BLOCK));
         Ok(())
     }
 
