@@ -29,21 +29,15 @@ fn corner_box(vertex: u32) -> Box {
 
 //#if DOPS
 fn corner_dop(vertex: u32) -> Dop {
-    return vertex_dop(positions[vertex].xyz, positions[params.second + vertex].xyz);
+    return vertex_dop(positions[vertex].xyz, positions[params.second + vertex].xyz, params.thickness);
 }
 
-fn whole_dop(a: ptr<function, Side>) -> Dop {
-    var x = (*a).dops[0];
-    var y = (*a).dops[1];
-    var z = (*a).dops[2];
-    var xy = dop_hull(&x, &y);
-    return dop_hull(&xy, &z);
+fn edge_dop(a: u32, b: u32) -> Dop {
+    return dop_hull(corner_dop(a), corner_dop(b));
 }
 
-fn edge_dop(a: ptr<function, Side>, first: u32, last: u32) -> Dop {
-    var x = (*a).dops[first];
-    var y = (*a).dops[last];
-    return dop_hull(&x, &y);
+fn whole_dop(corners: vec3<u32>) -> Dop {
+    return dop_hull(edge_dop(corners.x, corners.y), corner_dop(corners.z));
 }
 //#end
 
@@ -51,9 +45,6 @@ struct Side {
     corners: vec3<u32>,
     features: vec4<u32>,
     boxes: array<Box, 3>,
-//#if DOPS
-    dops: array<Dop, 3>,
-//#end
     // Bit per corner.
     is_active: u32,
 }
@@ -64,9 +55,6 @@ fn side(t: u32) -> Side {
         corners,
         features[t],
         array<Box, 3>(corner_box(corners.x), corner_box(corners.y), corner_box(corners.z)),
-//#if DOPS
-        array<Dop, 3>(corner_dop(corners.x), corner_dop(corners.y), corner_dop(corners.z)),
-//#end
         u32(is_active(corners.x)) | (u32(is_active(corners.y)) << 1u) | (u32(is_active(corners.z)) << 2u),
     );
 }
@@ -74,18 +62,11 @@ fn side(t: u32) -> Side {
 // Bit per corner of a: owned by it, no corner of b, and near b.
 fn vertices_near(a: ptr<function, Side>, b: ptr<function, Side>) -> u32 {
     let whole = hull(hull((*b).boxes[0], (*b).boxes[1]), (*b).boxes[2]);
-//#if DOPS
-    var other = whole_dop(b);
-//#end
     var near = 0u;
     for (var k = 0u; k < 3u; k++) {
         let is_owned = (((*a).features.w >> k) & 1u) != 0u;
         let is_live = (((*a).is_active >> k) & 1u) != 0u || (*b).is_active != 0u;
         if is_owned && is_live && all(vec3<u32>((*a).corners[k]) != (*b).corners) && may_touch((*a).boxes[k], whole) {
-//#if DOPS
-            var own = (*a).dops[k];
-            if !dops_may_touch(&own, &other, params.thickness) { continue; }
-//#end
             near |= 1u << k;
         }
     }
@@ -107,17 +88,38 @@ fn edges_near(a: ptr<function, Side>, b: ptr<function, Side>) -> u32 {
             let is_owned = (((*b).features.w >> (3u + j)) & 1u) != 0u && (a_active | b_active) != 0u;
             let is_apart = all(vec2<u32>((*a).corners[i]) != ends) && all(vec2<u32>((*a).corners[i_end]) != ends);
             if is_owned && is_apart && may_touch(box_a, hull((*b).boxes[j], (*b).boxes[j_end])) {
-//#if DOPS
-                var dop_a = edge_dop(a, i, i_end);
-                var dop_b = edge_dop(b, j, j_end);
-                if !dops_may_touch(&dop_a, &dop_b, params.thickness) { continue; }
-//#end
                 near |= 1u << (3u * i + j);
             }
         }
     }
     return near;
 }
+
+//#if DOPS
+// Which of the vertices and edges remain, bits as in feature_pairs. Few pairs come here: their boxes are the cheaper test.
+fn dops_near(a: vec3<u32>, b: vec3<u32>, vertices: u32, edges: u32) -> vec2<u32> {
+    let whole_a = whole_dop(a);
+    let whole_b = whole_dop(b);
+    if !dops_may_touch(whole_a, whole_b) { return vec2<u32>(); }
+    var near = vec2<u32>();
+    for (var bits = vertices; bits != 0u; bits &= bits - 1u) {
+        let k = firstTrailingBit(bits);
+        if k < 3u {
+            if dops_may_touch(corner_dop(a[k]), whole_b) { near.x |= 1u << k; }
+        } else if dops_may_touch(corner_dop(b[k - 3u]), whole_a) {
+            near.x |= 1u << k;
+        }
+    }
+    for (var bits = edges; bits != 0u; bits &= bits - 1u) {
+        let k = firstTrailingBit(bits);
+        let i = k / 3u;
+        let j = k % 3u;
+        let edge_a = edge_dop(a[i], a[(i + 1u) % 3u]);
+        if dops_may_touch(edge_a, edge_dop(b[j], b[(j + 1u) % 3u])) { near.y |= 1u << k; }
+    }
+    return near;
+}
+//#end
 
 @compute @workgroup_size(WORKGROUP)
 fn feature_pairs(
@@ -140,16 +142,15 @@ fn feature_pairs(
         pair = pairs[p];
         a = side(pair.x);
         b = side(pair.y);
-        var is_near = true;
+        vertices = vertices_near(&a, &b) | (vertices_near(&b, &a) << 3u);
+        edges = edges_near(&a, &b);
 //#if DOPS
-        var dop_a = whole_dop(&a);
-        var dop_b = whole_dop(&b);
-        is_near = dops_may_touch(&dop_a, &dop_b, params.thickness);
-//#end
-        if is_near {
-            vertices = vertices_near(&a, &b) | (vertices_near(&b, &a) << 3u);
-            edges = edges_near(&a, &b);
+        if (vertices | edges) != 0u {
+            let near = dops_near(a.corners, b.corners, vertices, edges);
+            vertices = near.x;
+            edges = near.y;
         }
+//#end
         if vertices != 0u { place.x = atomicAdd(&sh_counts[0], countOneBits(vertices)); }
         if edges != 0u { place.y = atomicAdd(&sh_counts[1], countOneBits(edges)); }
     }

@@ -45,9 +45,20 @@ pub fn detect(
     mesh: &CollisionMesh,
     query: &Query<'_>,
     most: usize,
+    run: impl FnMut(&CollisionMesh, &Query<'_>) -> Result<Contacts, GpuError>,
+) -> Result<Contacts, GpuError> {
+    detect_with(mesh, query, most, query.thickness, run)
+}
+
+/// [`detect`] with boxes for another thickness: a smaller one loses contacts.
+fn detect_with(
+    mesh: &CollisionMesh,
+    query: &Query<'_>,
+    most: usize,
+    thickness: f64,
     mut run: impl FnMut(&CollisionMesh, &Query<'_>) -> Result<Contacts, GpuError>,
 ) -> Result<Contacts, GpuError> {
-    let extents: Vec<Extent> = mesh.triangles.iter().map(|t| extent(query, t)).collect();
+    let extents: Vec<Extent> = mesh.triangles.iter().map(|t| extent(query, t, thickness)).collect();
     let mut waiting = vec![(0..mesh.triangles.len() as u32).collect::<Vec<u32>>()];
     let mut parts = Parts::default();
     while let Some(set) = waiting.pop() {
@@ -66,7 +77,7 @@ pub fn detect(
     Ok(parts.finish())
 }
 
-fn extent(query: &Query<'_>, corners: &[u32; 3]) -> Extent {
+fn extent(query: &Query<'_>, corners: &[u32; 3], thickness: f64) -> Extent {
     let ends = [if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 }, query.x_t1];
     let at = |v: u32| ends.map(|x| x[v as usize]);
     let [first, _] = at(corners[0]);
@@ -74,7 +85,7 @@ fn extent(query: &Query<'_>, corners: &[u32; 3]) -> Extent {
     for x in corners.iter().flat_map(|&v| at(v)) {
         (low, high) = (low.inf(&x), high.sup(&x));
     }
-    let margin = 0.5 * query.thickness;
+    let margin = 0.5 * thickness;
     let off = |x: f64| margin + (margin + x.abs()) * ROUNDING;
     Extent { low: low.map(|x| x - off(x)), high: high.map(|x| x + off(x)) }
 }
@@ -228,4 +239,76 @@ fn unique(mut list: Vec<([u32; 2], f64)>) -> (Vec<[u32; 2]>, Vec<f64>) {
     list.sort_unstable_by_key(|c| c.0);
     list.dedup_by_key(|c| c.0);
     list.into_iter().unzip()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
+mod tests {
+    use super::*;
+    use crate::collision::{BruteForce, Detector};
+
+    /// Triangles about a cube, side by side in pairs that are a little less than the thickness apart.
+    fn scene(size: f64, thickness: f64) -> (CollisionMesh, Vec<Vec3>) {
+        let mut state = 1u64;
+        let mut unit = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let (mut x, mut triangles) = (vec![], vec![]);
+        for _ in 0..60 {
+            let place = Vec3::new(unit(), unit(), unit());
+            let corners = [Vec3::zeros(), Vec3::y() * size, Vec3::z() * size];
+            for side in 0..2 {
+                let first = x.len() as u32;
+                triangles.push([first, first + 1, first + 2]);
+                x.extend(corners.map(|c| place + c + Vec3::x() * (f64::from(side) * 0.99 * thickness)));
+            }
+        }
+        (CollisionMesh::single(x.len(), &triangles).unwrap(), x)
+    }
+
+    fn contacts(size: f64, thickness: f64, margin: f64) -> [Contacts; 2] {
+        let (mesh, x) = scene(size, thickness);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let query = Query { x_t0: &x, x_t1: &x, thickness, mode: Mode::Discrete, active: None };
+        let run =
+            |mesh: &CollisionMesh, query: &Query<'_>| Ok(BruteForce.detect(mesh, query, &pool).unwrap());
+        let whole = run(&mesh, &query).unwrap();
+        [whole, detect_with(&mesh, &query, 10, margin, run).unwrap()]
+    }
+
+    #[test]
+    fn chunks_find_what_the_whole_has() {
+        for (size, thickness) in [(0.1, 0.05), (0.001, 0.01), (3.0, 0.0)] {
+            let [whole, chunks] = contacts(size, thickness, thickness);
+            assert!(chunks.stats.count("chunks") > 10 && whole.edge_edge.len() > 60);
+            assert_eq!(whole.vertex_triangle, chunks.vertex_triangle);
+            assert_eq!(whole.edge_edge, chunks.edge_edge);
+        }
+    }
+
+    #[test]
+    fn boxes_without_the_thickness_lose_contacts() {
+        let [whole, chunks] = contacts(0.1, 0.05, 0.0);
+        assert!(chunks.edge_edge.len() < whole.edge_edge.len());
+    }
+
+    #[test]
+    fn every_split_is_smaller_and_keeps_neighbours_together() {
+        for (size, thickness) in [(0.1, 0.05), (5.0, 0.0), (0.0, 0.0)] {
+            let (mesh, x) = scene(size, thickness);
+            let query = Query { x_t0: &x, x_t1: &x, thickness, mode: Mode::Discrete, active: None };
+            let extents: Vec<Extent> = mesh.triangles.iter().map(|t| extent(&query, t, thickness)).collect();
+            let set: Vec<u32> = (0..extents.len() as u32).collect();
+            let parts = split(&extents, &set);
+            assert!(parts.iter().all(|part| part.len() < set.len()));
+            for a in &set {
+                for b in &set {
+                    let (p, q) = (&extents[*a as usize], &extents[*b as usize]);
+                    let meet = (0..3).all(|k| p.low[k] <= q.high[k] && q.low[k] <= p.high[k]);
+                    assert!(!meet || parts.iter().any(|s| s.contains(a) && s.contains(b)), "{a}, {b}");
+                }
+            }
+        }
+    }
 }

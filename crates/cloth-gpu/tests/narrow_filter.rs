@@ -180,10 +180,11 @@ fn filter(thickness: f64, bounds: Bounds) -> impl Fn(bool, &[[f32; 4]; 8], &Fram
 fn slabs(slack: f32) -> impl Fn(bool, &[[f32; 4]; 8], &Frame) -> bool {
     move |edges, places, frame| {
         let whole = |range: std::ops::Range<usize>| {
-            range.map(|k| vertex_dop(places[k], places[k + 4])).reduce(Dop::hull).unwrap()
+            let of = |k: usize| vertex_dop(places[k], places[k + 4], frame.thickness, slack);
+            range.map(of).reduce(Dop::hull).unwrap()
         };
         let first = if edges { 2 } else { 1 };
-        !whole(0..first).may_touch(&whole(first..4), frame.thickness, slack)
+        !whole(0..first).may_touch(&whole(first..4))
     }
 }
 

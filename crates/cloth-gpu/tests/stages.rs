@@ -12,7 +12,7 @@ use cloth_gpu::stages::subdivision::{self, Subdivision};
 use cloth_gpu::stages::{cells::Cells, features::Features, pairs::Pairs};
 use cloth_gpu::twin::{self, pairs::SPHERE_FACTOR};
 use cloth_gpu::{Array, Frame, Gpu, Recorder};
-use support::{Random, bodies, device, pool, soup, variants};
+use support::{Random, bodies, device, moved, pool, soup, variants};
 
 /// Radii and distances may differ by the rounding of a few operations and of a square root.
 const ROUNDING: f32 = 1e-6;
@@ -197,10 +197,6 @@ fn difference(r: &Run) -> Option<&'static str> {
         return Some("vertex-triangle candidates");
     }
     (sorted(edge_edge) != sorted(r.edge_edge.clone())).then_some("edge-edge candidates")
-}
-
-fn moved(x: &[Vec3], by: f64, random: &mut Random) -> Vec<Vec3> {
-    x.iter().map(|x| x + random.vector(by)).collect()
 }
 
 /// A soup of n loose triangles, moving.

@@ -174,6 +174,11 @@ impl Pairs {
         Ok(())
     }
 
+    /// Of the tests recorded last: element k ≥ 1 is the registration that begins test k − 1 of them. None: they are searched for.
+    pub fn owners(&self) -> Option<&Array<u32>> {
+        self.owners.as_ref().map(|owners| &owners.scanned)
+    }
+
     /// Memory [B].
     pub fn bytes(&self) -> u64 {
         let owners = self.owners.as_ref().map_or(0, |o| o.marks.bytes() + o.scanned.bytes());

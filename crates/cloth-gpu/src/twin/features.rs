@@ -21,11 +21,12 @@ pub fn feature_pairs(
     let corners = |t: u32| -> [u32; 3] { [0, 1, 2].map(|k| triangles[t as usize][k]) };
     let whole = |t: u32| corners(t).map(corner).into_iter().reduce(MovingBox::hull);
     let slabs = |vertices: &[u32]| {
-        let of = |&v: &u32| dops::vertex_dop(positions[v as usize], positions[(params.second + v) as usize]);
-        vertices.iter().map(of).reduce(Dop::hull)
+        let ends = |v: u32| (positions[v as usize], positions[(params.second + v) as usize]);
+        let of = |(p, q)| dops::vertex_dop(p, q, params.thickness, dop_slack.unwrap_or(0.0));
+        vertices.iter().map(|&v| of(ends(v))).reduce(Dop::hull)
     };
     let dops_touch = |a: &[u32], b: &[u32]| match (dop_slack, slabs(a), slabs(b)) {
-        (Some(slack), Some(a), Some(b)) => a.may_touch(&b, params.thickness, slack),
+        (Some(_), Some(a), Some(b)) => a.may_touch(&b),
         _ => true,
     };
     let (mut vertex_triangle, mut edge_edge) = (vec![], vec![]);
