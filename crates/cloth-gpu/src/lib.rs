@@ -17,18 +17,25 @@ pub mod limits;
 pub mod stages;
 pub mod twin;
 
+pub mod chunks;
+
 mod buffers;
 mod context;
 mod error;
 mod frame;
 mod grid;
 mod octree;
+mod portions;
 mod recorder;
+mod seconds;
+mod tail;
 
 pub use buffers::{Array, Length};
 pub use context::{AdapterChoice, Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
-pub use grid::{GridGpu, GridOptions};
-pub use octree::{Levels, OctreeCounts, OctreeGpu, OctreeOptions, Thresholds};
+pub use grid::{Distribution, Duplicates, GridGpu, GridOptions};
+pub use octree::{Levels, OctreeGpu, OctreeOptions, Thresholds};
 pub use recorder::{Answer, Recorder};
+pub use seconds::Seconds;
+pub use tail::{Tail, TailCounts};

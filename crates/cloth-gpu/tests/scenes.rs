@@ -5,7 +5,7 @@
 mod support;
 
 use cloth_gpu::collision::{Bvh, CollisionMesh, Detector, Mode, Query, Vec3};
-use cloth_gpu::{GpuOptions, GridGpu, OctreeGpu};
+use cloth_gpu::{Distribution, Duplicates, GpuOptions, GridGpu, GridOptions, OctreeGpu};
 use std::time::Instant;
 use support::{device, difference, npz, pool};
 
@@ -84,6 +84,44 @@ fn subdivision_agrees_on_all() {
     }
 }
 
+/// What 18-DOPs and the filter save, and the other variants; the contacts of all are the same.
+fn variants_agree(name: &str) {
+    let Some(device) = device(GpuOptions::default()) else { return };
+    let Some(Scene { x_t0, x_t1, triangles }) = scene(name) else { return };
+    let pool = pool(2);
+    let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+    for mode in [Mode::Continuous, Mode::Discrete] {
+        let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode, active: None };
+        let expected = Bvh::new(&mesh, &x_t0).unwrap().detect(&mesh, &query, &pool).unwrap();
+        let plain = GridOptions { subdivision: Some(1.2), ..GridOptions::default() };
+        for options in [
+            GridOptions { dops: false, device_filter: false, ..plain },
+            GridOptions { dops: true, device_filter: false, ..plain },
+            GridOptions { dops: false, ..plain },
+            GridOptions { dops: true, ..plain },
+            GridOptions { distribution: Distribution::SegmentedScan, ..plain },
+            GridOptions { duplicates: Duplicates::All, ..plain },
+        ] {
+            let mut grid = GridGpu::with_options(device.gpu.clone(), &mesh, options).unwrap();
+            let got = grid.detect(&mesh, &query, &pool).unwrap();
+            assert_eq!(difference(&expected, &got), None, "{name}, {mode:?}, {options:?}");
+            println!("{name}, {mode:?}, {options:?}: {:?}", got.stats);
+        }
+    }
+}
+
+#[test]
+fn variants_agree_on_the_funnel() {
+    variants_agree("cloth-funnel");
+}
+
+#[test]
+#[ignore = "slow on a software adapter: run with --ignored"]
+fn variants_agree_on_the_others() {
+    variants_agree("cloth-ball");
+    variants_agree("n-body-simulation");
+}
+
 /// Octree, single-stage octree, virtual subdivision.
 fn octree_agrees(name: &str, mode: Mode, turns: &[&str]) {
     let Some(device) = device(GpuOptions::default()) else { return };
@@ -102,7 +140,7 @@ fn octree_agrees(name: &str, mode: Mode, turns: &[&str]) {
                 "{}, {name}, {mode:?}, {turn}: {:.2} s, {:?}, {} MiB, {:?}",
                 octree.name(),
                 clock.elapsed().as_secs_f64(),
-                octree.counted(),
+                octree.per_level(),
                 octree.bytes() >> 20,
                 got.stats
             );
