@@ -8,6 +8,7 @@ pub mod dops;
 pub mod features;
 pub mod grid;
 pub mod narrow_filter;
+pub mod octree;
 pub mod pairs;
 pub mod scan;
 pub mod sort;
