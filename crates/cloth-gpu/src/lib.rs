@@ -11,14 +11,14 @@
 
 pub use cloth_collision as collision;
 
+pub mod chunks;
 pub mod kernel;
 pub mod layout;
 pub mod limits;
 pub mod stages;
 pub mod twin;
 
-pub mod chunks;
-
+mod adapters;
 mod buffers;
 mod context;
 mod error;
@@ -30,8 +30,9 @@ mod recorder;
 mod seconds;
 mod tail;
 
+pub use adapters::{Adapter, AdapterChoice, adapters};
 pub use buffers::{Array, Length};
-pub use context::{AdapterChoice, Gpu, GpuOptions};
+pub use context::{Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
 pub use grid::{Distribution, Duplicates, GridGpu, GridOptions};
