@@ -3,7 +3,7 @@
 use super::folded;
 use cloth_gpu::collision::mesh::Vec3;
 use cloth_gpu::collision::{Bvh, CollisionMesh, Contacts, Detector, Mode, Query};
-use cloth_gpu::{Distribution, Duplicates, Gpu, GridGpu, GridOptions};
+use cloth_gpu::{Distribution, Duplicates, Gpu, GridGpu, GridOptions, OctreeGpu};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -96,6 +96,8 @@ fn methods(gpu: &Arc<Gpu>, mesh: &CollisionMesh, x: &[Vec3]) -> Vec<(&'static st
         ("bvh on the processor, 2 threads", Box::new(Bvh::new(mesh, x).unwrap())),
         ("grid", with(GridOptions::default())),
         ("virtual subdivision", with(parts)),
+        ("octree, single", Box::new(OctreeGpu::single(gpu.clone(), mesh).unwrap())),
+        ("octree", Box::new(OctreeGpu::new(gpu.clone(), mesh).unwrap())),
         (
             "virtual subdivision, segmented scan",
             with(GridOptions { distribution: Distribution::SegmentedScan, ..parts }),
@@ -116,7 +118,7 @@ pub(crate) fn stages(gpu: &Arc<Gpu>) {
         let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
         let query =
             Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.004, mode: Mode::Continuous, active: None };
-        for (name, detector) in &mut methods(gpu, &mesh, &x_t0)[1..3] {
+        for (name, detector) in &mut methods(gpu, &mesh, &x_t0)[1..5] {
             let (found, seconds) = measured(detector.as_mut(), &mesh, &query, 3);
             print(&format!("stages: {name}, {} triangles", triangles.len()), &found, &seconds);
         }
