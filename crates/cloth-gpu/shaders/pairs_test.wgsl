@@ -25,7 +25,7 @@ var<workgroup> sh_ends: array<u32, 2>;
 // Tests before each registration from the first to the last, counted from the workgroup's first test.
 var<workgroup> sh_window: array<u32, SEARCH_WINDOW>;
 //#end
-// Tests whose spheres touch.
+// Tests that passed the first look.
 var<workgroup> sh_near: array<u32, PAIR_BLOCK>;
 var<workgroup> sh_near_count: atomic<u32>;
 var<workgroup> sh_count: atomic<u32>;
@@ -102,11 +102,20 @@ fn spheres_touch(pair: vec2<u32>) -> bool {
 }
 
 //#if TOKEN
+// Many pairs share several leaves: those that are tested elsewhere go before the boxes are asked for.
+fn is_near(pair: vec2<u32>) -> bool {
+    return spheres_touch(pair) && holds_token(entries[pair.x], entries[pair.y]);
+}
+
 fn is_here(pair: vec2<u32>) -> bool {
-    return holds_token(entries[pair.x], entries[pair.y]);
+    return true;
 }
 //#end
 //#if !TOKEN
+fn is_near(pair: vec2<u32>) -> bool {
+    return spheres_touch(pair);
+}
+
 // Whether the pair is tested in this cell and not in the home of the second.
 fn is_here(pair: vec2<u32>) -> bool {
     return (entries[pair.y].key & 1u) == 0u
@@ -177,7 +186,7 @@ fn pairs_test(
     var near = 0u;
     for (var turn = 0u; turn < PAIR_ITEMS; turn++) {
         let test = turn * WORKGROUP + index;
-        if test < size && spheres_touch(locate(share, test)) { near |= 1u << turn; }
+        if test < size && is_near(locate(share, test)) { near |= 1u << turn; }
     }
     var slot = atomicAdd(&sh_near_count, countOneBits(near));
     for (; near != 0u; near &= near - 1u) {

@@ -122,7 +122,8 @@ fn variants_agree_on_the_others() {
     variants_agree("n-body-simulation");
 }
 
-/// Octree, single-stage octree, virtual subdivision.
+/// The octree's contacts are those of the tree on the CPU, with at least 39 % fewer tests than virtual subdivision takes, and no more
+/// than single-stage (thesis 6.4.2).
 fn octree_agrees(name: &str, mode: Mode, turns: &[&str]) {
     let Some(device) = device(GpuOptions::default()) else { return };
     let Some(Scene { x_t0, x_t1, triangles }) = scene(name) else { return };
@@ -130,44 +131,52 @@ fn octree_agrees(name: &str, mode: Mode, turns: &[&str]) {
     let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
     let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode, active: None };
     let expected = Bvh::new(&mesh, &x_t0).unwrap().detect(&mesh, &query, &pool).unwrap();
-    let mut tests = vec![];
-    for new in [OctreeGpu::new, OctreeGpu::single] {
+    let mut subdivision = GridGpu::virtual_subdivision(device.gpu.clone(), &mesh).unwrap();
+    let tests = subdivision.detect(&mesh, &query, &pool).unwrap().stats.broad_phase_tests;
+    drop(subdivision);
+    let mut single = 0;
+    for new in [OctreeGpu::single, OctreeGpu::new] {
         let mut octree = new(device.gpu.clone(), &mesh).unwrap();
+        let (method, mut first) = (octree.name(), None);
         for turn in turns {
             let clock = Instant::now();
             let got = octree.detect(&mesh, &query, &pool).unwrap();
             println!(
-                "{}, {name}, {mode:?}, {turn}: {:.2} s, {:?}, {} MiB, {:?}",
-                octree.name(),
+                "{method}, {name}, {mode:?}, {turn}: {:.2} s, {:?} per level, {} MiB, {:?}",
                 clock.elapsed().as_secs_f64(),
                 octree.per_level(),
                 octree.bytes() >> 20,
                 got.stats
             );
-            assert_eq!(difference(&expected, &got), None, "{}, {name}, {mode:?}, {turn}", octree.name());
-            tests.push(got.stats.broad_phase_tests);
+            assert_eq!(difference(&expected, &got), None, "{method}, {name}, {mode:?}, {turn}");
+            let got = got.stats.broad_phase_tests;
+            assert!(got * 100 <= tests * 61, "{method}, {name}, {mode:?}, {turn}: {got} of {tests}");
+            first.get_or_insert(got);
+        }
+        // The first trees have the same levels.
+        match method {
+            "octree" => assert!(first <= Some(single), "{first:?}, {single}"),
+            _ => single = first.unwrap_or(0),
         }
     }
-    let (two_stage, single_stage) = tests.split_at(turns.len());
-    // The first trees have the same levels.
-    assert!(two_stage[0] <= single_stage[0], "{tests:?}");
 }
 
 #[test]
-fn octree_agrees_on_cloth_ball() {
-    octree_agrees("cloth-ball", Mode::Continuous, &["first"]);
-}
-
-#[test]
-fn octree_agrees_on_funnel() {
+fn octree_agrees_on_the_funnel() {
     for mode in [Mode::Continuous, Mode::Discrete] {
-        octree_agrees("cloth-funnel", mode, &["first", "again", "once more"]);
+        octree_agrees("cloth-funnel", mode, &["first", "again"]);
     }
+}
+
+#[test]
+fn octree_agrees_on_cloth_ball_at_rest() {
+    octree_agrees("cloth-ball", Mode::Discrete, &["first"]);
 }
 
 #[test]
 #[ignore = "slow on a software adapter: run with --ignored"]
-fn octree_agrees_on_n_body() {
+fn octree_agrees_on_the_others() {
+    octree_agrees("cloth-ball", Mode::Continuous, &["first", "again"]);
     for mode in [Mode::Continuous, Mode::Discrete] {
         octree_agrees("n-body-simulation", mode, &["first", "again"]);
     }
