@@ -273,21 +273,33 @@ fn bad_input_is_named() {
     let Some(device) = device(GpuOptions::default()) else { return };
     let x = vec![Vec3::zeros(), Vec3::x(), Vec3::y()];
     let mesh = CollisionMesh::single(3, &[[0, 1, 2]]).unwrap();
-    let mut grid = GridGpu::new(device.gpu.clone(), &mesh).unwrap();
-    assert_eq!(grid.name(), "grid");
     let good = Query { x_t0: &x, x_t1: &x, thickness: 0.0, mode: Mode::Continuous, active: None };
-    let mut ask = |query: &Query<'_>| grid.detect(&mesh, query, &pool(1)).map(|_| ());
-    assert_eq!(ask(&good), Ok(()));
-    assert!(matches!(
-        ask(&Query { thickness: f64::NAN, ..good }),
-        Err(DetectError::Parameter { parameter: "thickness", .. })
-    ));
+    let empty = CollisionMesh::single(3, &[]).unwrap();
     let mut bad = x.clone();
     bad[2].z = f64::NAN;
-    assert!(matches!(
-        ask(&Query { x_t1: &bad, ..good }),
-        Err(DetectError::NotFinite { array: "x_t1", vertex: 2, .. })
-    ));
+    for (method, name) in [
+        (GridGpu::new as fn(_, &CollisionMesh) -> Result<GridGpu, GpuError>, "grid"),
+        (GridGpu::virtual_subdivision, "virtual-subdivision"),
+    ] {
+        let mut grid = method(device.gpu.clone(), &mesh).unwrap();
+        assert_eq!(grid.name(), name);
+        let mut ask = |query: &Query<'_>| grid.detect(&mesh, query, &pool(1)).map(|_| ());
+        assert_eq!(ask(&good), Ok(()));
+        assert!(matches!(
+            ask(&Query { thickness: f64::NAN, ..good }),
+            Err(DetectError::Parameter { parameter: "thickness", .. })
+        ));
+        assert!(matches!(
+            ask(&Query { x_t1: &bad, ..good }),
+            Err(DetectError::NotFinite { array: "x_t1", vertex: 2, .. })
+        ));
+        assert!(matches!(
+            grid.detect(&empty, &good, &pool(1)),
+            Err(DetectError::OtherMesh { expected: 1, got: 0 })
+        ));
+        let none = method(device.gpu.clone(), &empty).unwrap().detect(&empty, &good, &pool(1)).unwrap();
+        assert_eq!(none, Contacts::default());
+    }
     for lambda in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let options = GridOptions { subdivision: Some(lambda), ..GridOptions::default() };
         let refused = GridGpu::with_options(device.gpu.clone(), &mesh, options).map(|_| ());
@@ -296,13 +308,6 @@ fn bad_input_is_named() {
             Err(GpuError::Query(DetectError::Parameter { parameter: "subdivision", .. }))
         ));
     }
-    let empty = CollisionMesh::single(3, &[]).unwrap();
-    assert!(matches!(
-        grid.detect(&empty, &good, &pool(1)),
-        Err(DetectError::OtherMesh { expected: 1, got: 0 })
-    ));
-    let none = GridGpu::new(device.gpu.clone(), &empty).unwrap().detect(&empty, &good, &pool(1)).unwrap();
-    assert_eq!(none, Contacts::default());
 }
 
 #[test]

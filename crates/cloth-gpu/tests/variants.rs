@@ -175,3 +175,30 @@ fn both_kinds_of_sorts_keep_the_same_registrations() {
         }
     }
 }
+
+/// Seconds of each stage on the device where it can tell, else of the whole; and kernels are compiled once.
+#[test]
+fn stages_are_timed_and_kernels_compiled_once() {
+    for timestamps in [true, false] {
+        let Some(device) = device(GpuOptions { timestamps, ..GpuOptions::default() }) else { return };
+        let (mesh, x_t0, x_t1) = scene(100, &mut Random(4));
+        let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
+        let mut compiled = vec![];
+        for _ in 0..2 {
+            let mut grid = GridGpu::virtual_subdivision(device.gpu.clone(), &mesh).unwrap();
+            let seconds = grid.detect(&mesh, &query, &pool(1)).unwrap().stats.seconds;
+            let of = |name: &str| seconds.iter().find(|s| s.0 == name).map(|s| s.1);
+            for name in ["upload", "device", "narrow phase", "merge"] {
+                assert!(of(name).is_some_and(|s| s >= 0.0), "{name}: {seconds:?}");
+            }
+            let stages = ["bounds", "subdivision", "sort", "gather", "workload", "triangle pairs"];
+            for name in stages.into_iter().chain(["feature pairs", "narrow filter"]) {
+                assert_eq!(of(name).is_some(), device.gpu.has_timestamps(), "{name}: {seconds:?}");
+            }
+            let total: f64 = stages.into_iter().filter_map(of).sum();
+            assert!(Some(total) <= of("device"), "{seconds:?}");
+            compiled.push(device.gpu.compiled());
+        }
+        assert!(compiled[0] > 15 && compiled[0] == compiled[1], "{compiled:?}");
+    }
+}
