@@ -18,7 +18,7 @@ from conftest import SCENE, RunCli
 import clothsim as cs
 from clothsim import _core
 
-METHODS = ["grid", "virtual-subdivision"]
+METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 # Thrown at the ball, 5 cm in a step: hundreds of collisions in the first frames.
 FALLING = (
     SCENE.replace("nx = 17, ny = 17", "nx = 11, ny = 11")

@@ -34,7 +34,7 @@ pub use absent::{SharedGpu, adapters};
 /// Methods that run on the CPU; [`crate::collision::detector`] builds them.
 pub const CPU_METHODS: [&str; 2] = ["brute", "bvh"];
 /// Methods that run on a GPU.
-pub const GPU_METHODS: [&str; 2] = ["grid", "virtual-subdivision"];
+pub const GPU_METHODS: [&str; 4] = ["grid", "virtual-subdivision", "octree-single", "octree"];
 /// The method of `"auto"` on the CPU, and of a GPU's method where there is no GPU.
 const CPU_DEFAULT: &str = "bvh";
 /// The method of `"auto"` on a GPU.
@@ -137,7 +137,7 @@ pub struct Detected {
     pub method: &'static str,
     /// `"cpu"`, or the adapter with its driver.
     pub device: String,
-    /// What only this method counts: registrations, parts, bytes on the device; none on the CPU.
+    /// What only this method counts: registrations, parts or leaves, bytes on the device; none on the CPU.
     pub counts: Vec<(&'static str, u64)>,
     /// Why the CPU, where a GPU would have been taken.
     pub reason: Option<Reason>,
@@ -263,7 +263,7 @@ fn wrong_device(method: &'static str, device: &str) -> DeviceError {
     DeviceError::WrongDevice { method, expected }
 }
 
-/// Detects with the method `"brute"`, `"bvh"` (CPU), `"grid"`, `"virtual-subdivision"` (GPU) or `"auto"`, on the device.
+/// Detects with one of [`CPU_METHODS`] or [`GPU_METHODS`], or `"auto"`, on the device.
 ///
 /// The GPU is opened at the first call that wants it and kept; one call at a time computes on it. After a failure the next call
 /// opens it anew. The last two topologies stay on it, so that calls for the same mesh do not write it again.

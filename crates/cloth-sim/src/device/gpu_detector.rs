@@ -1,6 +1,6 @@
 //! A GPU's method as the detector of one simulation.
 
-use super::methods::GpuMethod;
+use super::methods::{GpuMethod, build};
 use super::shared::Open;
 use super::{Device, DeviceError, SharedGpu, Tuning};
 use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, Query};
@@ -21,7 +21,7 @@ struct Built {
     /// Where the GPU was opened: a forked process has no drivers' threads.
     process: u32,
     gpu: Arc<Gpu>,
-    method: GpuMethod,
+    method: Box<dyn GpuMethod>,
 }
 
 impl Built {
@@ -49,18 +49,18 @@ impl GpuDetector {
     }
 
     /// The method on this GPU.
-    fn on(&mut self, open: &Open, mesh: &CollisionMesh) -> Result<&mut GpuMethod, DetectError> {
+    fn on(&mut self, open: &Open, mesh: &CollisionMesh) -> Result<&mut dyn GpuMethod, DetectError> {
         if self.built.as_ref().is_some_and(|b| !b.is_here() || !Arc::ptr_eq(&b.gpu, &open.gpu)) {
             self.leave();
         }
         let built = match &mut self.built {
             Some(built) => built,
             none => {
-                let method = GpuMethod::new(open.gpu.clone(), mesh, self.method, &Tuning::default())?;
+                let method = build(open.gpu.clone(), mesh, self.method, &Tuning::default())?;
                 none.insert(Built { process: std::process::id(), gpu: open.gpu.clone(), method })
             }
         };
-        Ok(&mut built.method)
+        Ok(built.method.as_mut())
     }
 
     /// Gives the memory on the device back, unless it is another process's.

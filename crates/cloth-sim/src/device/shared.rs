@@ -102,7 +102,9 @@ impl SharedGpu {
         let answer = self.with(device, |open| {
             let kept = open.kept.get(&open.gpu, mesh, method, tuning)?;
             let contacts = kept.detect(mesh, query, pool)?;
-            Ok((contacts, kept.counts()))
+            let mut counts = kept.counted();
+            counts.push(("bytes", kept.bytes()));
+            Ok((contacts, counts))
         });
         let reason = match answer {
             Ok(((contacts, counts), device)) => {
