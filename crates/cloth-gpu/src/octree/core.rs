@@ -150,8 +150,8 @@ impl Registrar for Tree {
         vec![
             ("registrations", levels.iter().map(|&n| u64::from(n)).sum()),
             ("leaves", leaves[0].into()),
-            ("top_level", self.levels.top.into()),
-            ("base_level", self.levels.base.into()),
+            ("coarsest_level", self.levels.top.into()),
+            ("finest_level", self.levels.base.into()),
         ]
     }
 }

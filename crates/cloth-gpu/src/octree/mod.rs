@@ -66,6 +66,7 @@ pub struct OctreeGpu {
     max_triangles: usize,
     /// None: in chunks.
     whole: Option<Core>,
+    counted: Vec<(&'static str, u64)>,
 }
 
 impl OctreeGpu {
@@ -117,6 +118,7 @@ impl OctreeGpu {
             triangle_count: mesh.triangles.len(),
             max_triangles,
             whole,
+            counted: vec![],
             gpu,
         })
     }
@@ -129,6 +131,12 @@ impl OctreeGpu {
     /// Registrations per level in the last call; none where the scene goes in chunks.
     pub fn per_level(&self) -> &[u32] {
         self.whole.as_ref().map_or(&[], Core::per_level)
+    }
+
+    /// What the last call counted, by name: registrations, leaves that hold triangles, coarsest and finest level of the tree; in chunks,
+    /// the registrations and leaves of all.
+    pub fn counted(&self) -> &[(&'static str, u64)] {
+        &self.counted
     }
 
     /// Memory on the device, scratch memory of sorts and scans not counted [B]; 0 where the scene goes in chunks, which keep none.
@@ -149,9 +157,12 @@ impl OctreeGpu {
             }
         }
         let (gpu, options) = (&self.gpu, &self.options);
-        chunks::detect(mesh, query, self.max_triangles, |mesh, query| {
+        let mut out = chunks::detect(mesh, query, self.max_triangles, |mesh, query| {
             Core::new(gpu.clone(), mesh, options)?.run(mesh, query, pool)
-        })
+        })?;
+        // Every chunk has its own levels.
+        out.stats.counts.retain(|c| !["coarsest_level", "finest_level"].contains(&c.0));
+        Ok(out)
     }
 }
 
@@ -174,9 +185,12 @@ impl Detector for OctreeGpu {
             return Ok(Contacts::default());
         }
         let detector = self.name();
-        self.run(mesh, query, pool).map_err(|error| match error {
+        let contacts = self.run(mesh, query, pool).map_err(|error| match error {
             GpuError::Query(error) => error,
             error => DetectError::Device { detector, reason: error.to_string() },
-        })
+        })?;
+        let known = ["registrations", "leaves", "coarsest_level", "finest_level"];
+        self.counted = contacts.stats.counts.iter().copied().filter(|c| known.contains(&c.0)).collect();
+        Ok(contacts)
     }
 }
