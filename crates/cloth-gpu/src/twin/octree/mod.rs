@@ -292,7 +292,7 @@ mod tests {
             assert!(two <= single, "{two}, {single}");
             gained += usize::from(two < single);
             // A count that is off: cells as if every triangle met half of the others only once.
-            wrong += usize::from(cost(1, |n| u64::from(n)) > two);
+            wrong += usize::from(cost(1, u64::from) > two);
         }
         assert!(gained > 1, "some scene must show the difference");
         assert!(wrong > 1, "a wrong cost must show");
