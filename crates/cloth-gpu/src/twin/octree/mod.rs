@@ -291,7 +291,7 @@ mod tests {
             assert_eq!(two, least(&params, &counts, 0, [0; 3]));
             assert!(two <= single, "{two}, {single}");
             gained += usize::from(two < single);
-            // A count that is off: cells as if every triangle met half of the others only once.
+            // Divided by the number of triangles instead of pairs.
             wrong += usize::from(cost(1, u64::from) > two);
         }
         assert!(gained > 1, "some scene must show the difference");
