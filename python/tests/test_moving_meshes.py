@@ -20,7 +20,7 @@ SMALL: dict[str, tuple[Callable[[], Moving], int]] = {
     "skirt": (lambda: pushed.skirt(64, 8, 3), 2 * 3 * 64 * 8 + 14 * 2 * 24 * 13),
 }
 # Of the thesis's benchmarks, thousands (Table 5.1).
-FULL = {
+FULL: dict[str, tuple[Callable[..., Moving], int]] = {
     "reef": (knots.reef, 20),
     "bowline": (knots.bowline, 11),
     "funnel": (pushed.funnel, 18),
