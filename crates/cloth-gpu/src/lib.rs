@@ -22,6 +22,7 @@ mod context;
 mod error;
 mod frame;
 mod grid;
+mod octree;
 mod recorder;
 
 pub use buffers::{Array, Length};
@@ -29,4 +30,5 @@ pub use context::{AdapterChoice, Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
 pub use grid::{GridGpu, GridOptions};
+pub use octree::{Levels, OctreeCounts, OctreeGpu, OctreeOptions, Thresholds};
 pub use recorder::{Answer, Recorder};

@@ -61,6 +61,13 @@ pub const MAX_PART_BITS: u32 = 18;
 /// What the rounding of a part's corners can add up to, with room: sums of six products of numbers within [−1, 1].
 pub const PART_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
+/// Levels of the small trees below the pages of an octree.
+pub const PAGE_LEVELS: u32 = 3;
+/// Finest level that an octree may have: places along an axis take ten bits.
+pub const MAX_LEVELS: u32 = 10;
+/// Words of what an octree counts: registrations per level, then leaves.
+pub const TALLY_LENGTH: u32 = MAX_LEVELS + 2;
+
 /// The constants as WGSL.
 pub fn shader_prelude() -> String {
     let floats = [
@@ -84,6 +91,8 @@ pub fn shader_prelude() -> String {
         ("PAIR_BLOCK", PAIR_BLOCK),
         ("SEARCH_WINDOW", SEARCH_WINDOW),
         ("MAX_PART_BITS", MAX_PART_BITS),
+        ("TALLY_LENGTH", TALLY_LENGTH),
+        ("TALLY_LEAVES", TALLY_LENGTH - 1),
         ("STATUS_TOO_FINE", status::TOO_FINE),
         ("STATUS_RADIUS", status::RADIUS),
         ("STATUS_KEY_BITS", status::KEY_BITS),
