@@ -16,11 +16,12 @@ from clothsim.reproduce.benchmarks import Benchmark, Suite
 from clothsim.reproduce.contract import Check, Effort
 
 __all__ = [
-    "GRID", "METHODS", "VIRTUAL", "Counted", "agreement", "bars", "chosen", "count", "device_words", "foot", "left_out",
-    "logarithmic", "million", "scenes", "shares",
+    "GRID", "METHODS", "OCTREE", "SINGLE", "VIRTUAL", "Counted", "agreement", "bars", "chosen", "count", "device_words",
+    "foot", "left_out", "logarithmic", "million", "scenes", "shares",
 ]  # fmt: skip
 
 GRID, VIRTUAL = "grid", "virtual-subdivision"
+SINGLE, OCTREE = "octree-single", "octree"
 _WHOLE = ("device", "upload", "merge")  # not stages of the device: the call as a whole, and what the host copies
 _SOFTWARE = ("llvmpipe", "lavapipe", "swiftshader", "basic render")
 _ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
@@ -35,7 +36,7 @@ class Counted:
     tests : float
         Broad-phase tests: pairs of triangles in one cell, duplicates included, before control bits or tokens.
     registrations, parts : float
-        Of triangles in cells; what these come to, with the parts of subdivided ones.
+        Of triangles in cells; what these come to, with the parts of subdivided ones where there are any.
     bytes : float
         On the device, the largest of the steps.
     contacts : int
@@ -96,10 +97,11 @@ def count(
         return float(np.mean([s[name] for s in stats]))
 
     names = dict.fromkeys(name for s in stats for name in s["seconds"] if name not in _WHOLE)
+    parts = mean("parts") if "parts" in stats[0] else float(len(benchmark.triangles))
     seconds = {name: float(np.mean([s["seconds"].get(name, 0.0) for s in stats])) for name in names}
     return Counted(
-        mean("broad_phase_tests"), mean("registrations"), mean("parts"), float(max(s["bytes"] for s in stats)),
-        contacts, differing, seconds, str(stats[0]["device"]),
+        mean("broad_phase_tests"), mean("registrations"), parts, float(max(s["bytes"] for s in stats)), contacts,
+        differing, seconds, str(stats[0]["device"]),
     )  # fmt: skip
 
 
@@ -164,7 +166,7 @@ def shares(seconds: Mapping[str, float], groups: Mapping[str, Sequence[str]]) ->
     return found
 
 
-METHODS = {GRID: "#c9c5be", VIRTUAL: "#2f5d8c"}
+METHODS = {GRID: "#c9c5be", VIRTUAL: "#2f5d8c", SINGLE: "#c08a2e", OCTREE: "#9c2f35"}
 
 
 def bars(axis: Any, suite: Suite, counts: Mapping[tuple[str, str], Counted], methods: Sequence[str]) -> None:
@@ -196,7 +198,8 @@ def _nothing() -> Any:
 
 def scenes(axis: Any, names: Sequence[str]) -> None:
     """Write the benchmarks' names below bars."""
-    axis.set_xticks(range(len(names)), [name.replace(" (", "\n(") for name in names], fontsize=9.5)
+    size = 9.5 if len(names) < 6 else 8.5
+    axis.set_xticks(range(len(names)), [name.replace(" (", "\n(") for name in names], fontsize=size)
     axis.tick_params(axis="x", length=0)
     axis.grid(axis="x", visible=False)
     axis.spines["bottom"].set_color(pictures.GRID)

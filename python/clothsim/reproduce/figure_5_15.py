@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from clothsim.reproduce.contract import Check, Effort, Table
-from clothsim.reproduce.counting import VIRTUAL, agreement, chosen, device_words, left_out
+from clothsim.reproduce.counting import VIRTUAL
 from clothsim.reproduce.timings import GROUPS, Parts, draw_parts, parts
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
@@ -23,47 +23,26 @@ def measure(effort: Effort) -> Parts:
 
 def parameters(measured: Parts) -> Mapping[str, Any]:
     """What was timed, on what."""
-    return {
-        "shown": measured.name, **chosen(measured.suite), "mode": "continuous", "lambda": 1.2,
-        "device": device_words(measured.counted.device),
-        **{f"step {group!r}": ", ".join(stages) for group, stages in GROUPS.items()},
-        "subdivision, assignment": "one stage here; the thesis's 8 % are those of the subdivision alone",
-    }  # fmt: skip
+    words = "one stage here; the thesis's 8 % are those of the subdivision alone"
+    return {**measured.parameters(), "lambda": 1.2, "subdivision, assignment": words}
 
 
 def tables(measured: Parts) -> Mapping[str, Table]:
     """One row per step, and per stage."""
-    rows = [(group, share, PRINTED.get(group, float("nan"))) for group, share in measured.shares.items()]
-    stages = [(stage, 1e3 * s) for stage, s in measured.counted.seconds.items()]
-    return {
-        "": Table(("step", "share [%]", "thesis [%]"), rows),
-        "stages": Table(("stage", "time [ms]"), stages),
-    }
+    return measured.tables(PRINTED)
 
 
 def here(measured: Parts) -> str:
     """The shares."""
-    words = ", ".join(f"{group} {share:.0f} %" for group, share in measured.shares.items())
-    text = (
-        f"{measured.name}: {words} of {measured.counted.milliseconds:.3g} ms; {device_words(measured.counted.device)}"
-    )
-    return text if measured.name == SHOWN else left_out(measured.suite, text)
+    return measured.here()
 
 
 def checks(measured: Parts) -> Sequence[Check]:
     """Only what does not depend on the device."""
-    total = sum(measured.shares.values())
-    return [
-        Check("shares of all steps [%]", total, 100.0, 1e-6, "each stage counts once"),
-        *agreement([measured.counted]),
-    ]
+    return measured.checks()
 
 
 def draw(measured: Parts) -> bytes:
     """The shares beside the thesis's."""
-    return draw_parts(
-        measured,
-        PRINTED,
-        "Figure 5.15: steps of virtual subdivision",
-        "Continuous detection on a GPU; narrow phase on the CPU.",
-    )
+    words = "Continuous detection on a GPU; narrow phase on the CPU."
+    return draw_parts(measured, PRINTED, "Figure 5.15: steps of virtual subdivision", words)

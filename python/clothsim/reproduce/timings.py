@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clothsim.reproduce import pictures
-from clothsim.reproduce.benchmarks import Suite, suite
+from clothsim.reproduce.benchmarks import SMALL, Suite, suite
 from clothsim.reproduce.contract import Check, Effort, Table
 from clothsim.reproduce.counting import (
     METHODS,
@@ -19,16 +19,24 @@ from clothsim.reproduce.counting import (
     count,
     device_words,
     foot,
+    left_out,
     logarithmic,
     scenes,
     shares,
 )
 
-__all__ = ["MODES", "Parts", "Times", "draw_parts", "draw_times", "parts", "times"]
+__all__ = ["GROUPS", "MODES", "OCTREE_GROUPS", "Parts", "Times", "draw_parts", "draw_times", "parts", "times"]
 
 MODES = {"discrete": "DCD", "continuous": "CCD"}
 _ROUNDS, _QUICK_ROUNDS = 2, 0
 # Stages by the thesis's names (Figures 5.15 and 6.11).
+OCTREE_GROUPS = {
+    "update of BVs": ("bounds",),
+    "building the octree": ("counter tree", "bottom-up", "top-down"),
+    "assignment, sort": ("registrations", "sort", "gather"),
+    "broad phase": ("workload", "triangle pairs", "feature pairs"),
+    "narrow phase": ("narrow phase",),
+}
 GROUPS = {
     "update of BVs": ("bounds",),
     "subdivision, assignment": ("subdivision", "cells"),
@@ -84,9 +92,9 @@ def _rounds(rounds: int) -> str:
     return f"the fastest of {rounds} rounds after a first call" if rounds else "one call, the first"
 
 
-def times(effort: Effort, methods: Sequence[str], name: str) -> Times:
+def times(effort: Effort, methods: Sequence[str], name: str, *, quick: Sequence[str] = SMALL) -> Times:
     """Detect with each method, discrete and continuous, in one step of each benchmark."""
-    found, rounds = suite(effort, steps=1), _QUICK_ROUNDS if effort.quick else _ROUNDS
+    found, rounds = suite(effort, steps=1, quick=quick), _QUICK_ROUNDS if effort.quick else _ROUNDS
     total = len(found.benchmarks) * len(methods) * len(MODES) * (1 + rounds)
     with effort.bar(total, name, "call") as bar:
         counts = {
@@ -131,10 +139,11 @@ def draw_times(
 
 @dataclass(frozen=True)
 class Parts:
-    """One method on one benchmark, continuous, timed by stage."""
+    """One method on one benchmark, continuous, timed by stage; ``is_shown``: the thesis's benchmark."""
 
     suite: Suite
     name: str
+    is_shown: bool
     counted: Counted
     groups: dict[str, Sequence[str]]
 
@@ -143,6 +152,38 @@ class Parts:
         """Share of each of the thesis's steps [%]."""
         return shares(self.counted.seconds, self.groups)
 
+    def parameters(self) -> dict[str, Any]:
+        """What was timed, on what."""
+        return {
+            "shown": self.name, **chosen(self.suite), "mode": "continuous", "device": device_words(self.counted.device),
+            **{f"step {group!r}": ", ".join(stages) for group, stages in self.groups.items()},
+        }  # fmt: skip
+
+    def tables(self, printed: Mapping[str, float]) -> dict[str, Table]:
+        """One row per step, and per stage."""
+        rows = [(group, share, printed.get(group, float("nan"))) for group, share in self.shares.items()]
+        stages = [(stage, 1e3 * s) for stage, s in self.counted.seconds.items()]
+        return {
+            "": Table(("step", "share [%]", "thesis [%]"), rows),
+            "stages": Table(("stage", "time [ms]"), stages),
+        }
+
+    def here(self) -> str:
+        """The shares."""
+        words = ", ".join(f"{group} {share:.0f} %" for group, share in self.shares.items())
+        text = f"{self.name}: {words} of {self.counted.milliseconds:.3g} ms; {device_words(self.counted.device)}"
+        return text if self.is_shown else left_out(self.suite, text)
+
+    def checks(self) -> list[Check]:
+        """Only what does not depend on the device."""
+        known = [stage for stages in self.groups.values() for stage in stages]
+        strange = sum(stage not in known for stage in self.counted.seconds)
+        return [
+            Check("stages that belong to no step", strange, 0.0, 0.0, "each stage counts in one step"),
+            Check("shares of all steps [%]", sum(self.shares.values()), 100.0, 1e-6, "each stage counts once"),
+            *agreement([self.counted]),
+        ]
+
 
 def parts(effort: Effort, method: str, wanted: str, groups: Mapping[str, Sequence[str]], name: str) -> Parts:
     """Time the stages on the thesis's benchmark, or the first there is."""
@@ -150,7 +191,7 @@ def parts(effort: Effort, method: str, wanted: str, groups: Mapping[str, Sequenc
     benchmark = found.named(wanted) or found.benchmarks[0]
     with effort.bar(1 + rounds, name, "call") as bar:
         counted = count(benchmark, method, effort, rounds=rounds, done=bar.update)
-    return Parts(found, benchmark.name, counted, dict(groups))
+    return Parts(found, benchmark.name, benchmark.name == wanted, counted, dict(groups))
 
 
 def draw_parts(measured: Parts, printed: Mapping[str, float], title: str, note: str) -> bytes:
