@@ -14,7 +14,7 @@ from clothsim._device import check_threads
 
 __all__ = ["Detection", "detect", "edge_edge_ccd", "self_intersections", "vertex_triangle_ccd"]
 
-Method = Literal["brute", "bvh", "grid", "virtual-subdivision", "auto"]
+Method = Literal["brute", "bvh", "grid", "virtual-subdivision", "octree-single", "octree", "auto"]
 Mode = Literal["continuous", "discrete"]
 
 _logger = logging.getLogger(__name__)
@@ -39,7 +39,8 @@ class Detection:
     stats : dict
         ``method`` and ``device`` that found them (``"cpu"``, or the GPU with its driver), counts
         (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage. The methods of a GPU also
-        count ``registrations`` of triangles in cells, the ``parts`` these come to, and the ``bytes`` on the device.
+        count ``registrations`` of triangles in cells, the ``parts`` these come to (octrees: ``leaves``,
+        ``coarsest_level``, ``finest_level``), and the ``bytes`` on the device.
     """
 
     vertex_triangle: Ints
@@ -75,9 +76,10 @@ def detect(
         Positions at both ends of the step [m].
     triangles : (m, 3) array of int32 or int64
         Vertex indices.
-    method : {"bvh", "brute", "grid", "virtual-subdivision", "auto"}
+    method : {"bvh", "brute", "grid", "virtual-subdivision", "octree-single", "octree", "auto"}
         On the CPU: ``"bvh"``, a tree of boxes; ``"brute"``, every pair, the oracle, for small meshes. On a GPU:
-        ``"grid"``, a uniform grid; ``"virtual-subdivision"``, a finer one in which large triangles count in parts.
+        ``"grid"``, a uniform grid; ``"virtual-subdivision"``, a finer one in which large triangles count in parts;
+        ``"octree-single"`` and ``"octree"``, adaptive octrees of one and two stages.
         ``"auto"``: ``"bvh"`` on the CPU, ``"virtual-subdivision"`` on a GPU.
     mode : {"continuous", "discrete"}
         The motion, or the end positions ``x_t1`` alone.

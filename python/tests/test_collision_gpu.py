@@ -14,7 +14,7 @@ import pytest
 
 import clothsim as cs
 
-METHODS = ["grid", "virtual-subdivision"]
+METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
 
 
@@ -65,7 +65,7 @@ def test_threads_that_call_at_once_all_get_the_contacts(gpu: str) -> None:
     found: dict[int, cs.collision.Detection] = {}
 
     def work(k: int) -> None:
-        found[k] = cs.collision.detect(*frames[k], METHODS[k % 2], device="gpu", threads=1)
+        found[k] = cs.collision.detect(*frames[k], METHODS[k], device="gpu", threads=1)
 
     workers = [threading.Thread(target=work, args=(k,)) for k in range(len(frames))]
     for worker in workers:

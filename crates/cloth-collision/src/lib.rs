@@ -31,6 +31,7 @@ mod detector;
 mod error;
 mod intersect;
 mod narrow;
+mod nearest;
 mod stencil;
 
 pub use brute::BruteForce;
@@ -42,6 +43,7 @@ pub use detector::{Detector, detector};
 pub use error::DetectError;
 pub use intersect::{intersections, self_intersections};
 pub use narrow::NarrowPhase;
+pub use nearest::Nearest;
 pub use stencil::{Stencil, StencilKind, stencil_at_contact_edge_edge, stencil_at_contact_vertex_triangle};
 
 /// A point [m] in space.

@@ -17,6 +17,7 @@ pub mod limits;
 pub mod stages;
 pub mod twin;
 
+mod adapters;
 mod buffers;
 mod context;
 mod error;
@@ -25,8 +26,9 @@ mod grid;
 mod octree;
 mod recorder;
 
+pub use adapters::{Adapter, AdapterChoice, adapters};
 pub use buffers::{Array, Length};
-pub use context::{AdapterChoice, Gpu, GpuOptions};
+pub use context::{Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
 pub use grid::{GridGpu, GridOptions};

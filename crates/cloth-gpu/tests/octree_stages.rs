@@ -35,6 +35,7 @@ struct Run {
     counts: Vec<u32>,
     firsts: Vec<u32>,
     members: Vec<u32>,
+    selected: Vec<u32>,
     costs: Vec<[u32; 2]>,
     types: Vec<u32>,
     kinds: Vec<u32>,
@@ -83,6 +84,8 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, levels: Levels, is_tw
         whole(r, &octree.entries),
         whole(r, &octree.tally),
         whole(r, &pairs.found),
+        whole(r, &octree.selected),
+        whole(r, &octree.selected_before),
     ];
     let answer = recorder.run().unwrap();
     let words: Vec<u32> = answer.read(copies[2]);
@@ -91,6 +94,7 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, levels: Levels, is_tw
     let offsets = first(answer.read::<[u32; 2]>(copies[4]), n + 1);
     let sums = first(answer.read::<[u32; 2]>(copies[12]), octree.room() as usize + 1);
     let (visits, registrations) = (wide(offsets[n]) as usize, wide(*sums.last().unwrap()) as usize);
+    let trees = answer.read::<u32>(copies[19])[pages] as usize;
     let tests = wide([words[status::PAIRS as usize], words[status::PAIRS as usize + 1]]);
     assert!(tests < TESTS.into(), "{tests} tests: all in one part");
     Run {
@@ -102,6 +106,7 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, levels: Levels, is_tw
         counts: first(answer.read(copies[5]), nodes),
         firsts: first(answer.read(copies[6]), pages + 1),
         members: first(answer.read(copies[7]), visits),
+        selected: first(answer.read(copies[18]), trees),
         costs: first(answer.read(copies[8]), nodes),
         types: first(answer.read(copies[9]), 3 * pages),
         kinds: first(answer.read(copies[10]), nodes),
@@ -163,6 +168,12 @@ fn difference(r: &Run) -> Option<&'static str> {
         .collect();
     if sorted(placed) != sorted(visits.iter().map(|&(t, page)| (page, t)).collect()) {
         return Some("members");
+    }
+    let members = |page: &u32| r.counts[*page as usize];
+    let has_tree =
+        |page: &u32| p.base > p.page && (members(page) > 1 || (members(page) == 1 && p.top > p.page));
+    if !(0..pages as u32).filter(has_tree).eq(r.selected.iter().copied()) {
+        return Some("selected");
     }
     let tree = octree_tree(p, &ranges, tests_of);
     for level in p.page..p.base {
@@ -293,13 +304,14 @@ fn planted_faults_are_caught() {
     let good = run(&device.gpu, &mesh, &query, Levels { top: 1, base: 5 }, true);
     assert_eq!(difference(&good), None);
     assert!(good.kinds.contains(&1) && good.leaves.contains(&2) && good.types.iter().any(|&t| t > 1));
-    let faults: [(&str, Fault); 17] = [
+    let faults: [(&str, Fault); 18] = [
         ("ranges", |r| r.ranges[3][0] += 1),
         ("offsets", |r| r.offsets[9][0] += 1),
         ("counts", |r| r.counts[1] += 1),
         ("counts", |r| *r.counts.last_mut().unwrap() += 1),
         ("members", |r| r.members[5] ^= 1),
         ("members", |r| r.firsts[7] += 1),
+        ("selected", |r| r.selected.truncate(3)),
         ("types", |r| r.types[0] ^= 1),
         ("types", |r| r.types[2] ^= 1 << 5),
         ("bottom-up", |r| r.costs[0][0] += 1),

@@ -194,6 +194,7 @@ pub(crate) fn sim_error(py: Python<'_>, error: &SimError) -> PyErr {
         }
         SimError::InvalidCheckpoint { .. } => exception(py, "CheckpointError", &message, |_| Ok(())),
         SimError::InvalidArgument { name, expected, got } => invalid_input(py, name, expected, got),
+        SimError::Device(inner) => device_error(py, inner),
         SimError::Stage { stage, .. } => {
             exception(py, "SolverFailed", &message, |attributes| attributes.set_item("stage", *stage))
         }

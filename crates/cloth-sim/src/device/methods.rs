@@ -1,60 +1,73 @@
 //! The methods of `cloth-gpu` by name, built for one topology, and the last few of them.
 
 use super::Tuning;
-use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, Query};
-use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions};
+use crate::collision::{CollisionMesh, DetectError, Detector};
+use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions, OctreeCounts, OctreeGpu, OctreeOptions};
 use std::sync::Arc;
 
 /// λ of virtual subdivision where nothing else is asked for (thesis 5.3).
 const CELL_FACTOR: f64 = 1.2;
 
 /// A method of a GPU with the topology that it was built for on the device.
-#[derive(Debug)]
-pub(crate) enum GpuMethod {
-    Grid(Box<GridGpu>),
+pub(crate) trait GpuMethod: Detector + std::fmt::Debug {
+    /// Memory on the device \[B\].
+    fn bytes(&self) -> u64;
+
+    /// What the last call counted beside [`crate::collision::DetectStats`].
+    fn counted(&self) -> Vec<(&'static str, u64)>;
 }
 
-impl GpuMethod {
-    /// Writes the topology to the device.
-    pub(crate) fn new(
-        gpu: Arc<Gpu>,
-        mesh: &CollisionMesh,
-        method: &'static str,
-        tuning: &Tuning,
-    ) -> Result<Self, DetectError> {
-        let subdivision = match method {
-            "virtual-subdivision" => Some(tuning.cell_factor.unwrap_or(CELL_FACTOR) as f32),
-            _ => None,
-        };
+impl GpuMethod for GridGpu {
+    fn bytes(&self) -> u64 {
+        Self::bytes(self)
+    }
+
+    fn counted(&self) -> Vec<(&'static str, u64)> {
+        vec![("registrations", self.registrations()), ("parts", self.parts())]
+    }
+}
+
+impl GpuMethod for OctreeGpu {
+    fn bytes(&self) -> u64 {
+        Self::bytes(self)
+    }
+
+    fn counted(&self) -> Vec<(&'static str, u64)> {
+        let OctreeCounts { levels: [coarsest, finest], registrations, leaves, .. } = Self::counted(self);
+        vec![
+            ("registrations", registrations),
+            ("leaves", leaves),
+            ("coarsest_level", coarsest.into()),
+            ("finest_level", finest.into()),
+        ]
+    }
+}
+
+/// Writes the topology to the device for one of [`super::GPU_METHODS`].
+pub(crate) fn build(
+    gpu: Arc<Gpu>,
+    mesh: &CollisionMesh,
+    method: &'static str,
+    tuning: &Tuning,
+) -> Result<Box<dyn GpuMethod>, DetectError> {
+    let grid = |gpu, subdivision| {
         let options = GridOptions { subdivision, ..GridOptions::default() };
-        let grid = GridGpu::with_options(gpu, mesh, options).map_err(|error| match error {
-            GpuError::Query(error) => error,
-            error => DetectError::Device { detector: method, reason: error.to_string() },
-        })?;
-        Ok(Self::Grid(Box::new(grid)))
-    }
-
-    pub(crate) fn detect(
-        &mut self,
-        mesh: &CollisionMesh,
-        query: &Query<'_>,
-        pool: &rayon::ThreadPool,
-    ) -> Result<Contacts, DetectError> {
-        match self {
-            Self::Grid(grid) => grid.detect(mesh, query, pool),
-        }
-    }
-
-    /// What the last call counted beside [`crate::collision::DetectStats`], and the memory on the device \[B\].
-    pub(crate) fn counts(&self) -> Vec<(&'static str, u64)> {
-        match self {
-            Self::Grid(grid) => vec![
-                ("registrations", grid.registrations()),
-                ("parts", grid.parts()),
-                ("bytes", grid.bytes()),
-            ],
-        }
-    }
+        Ok(Box::new(GridGpu::with_options(gpu, mesh, options)?) as Box<dyn GpuMethod>)
+    };
+    let octree = |gpu, two_stage| {
+        let options = OctreeOptions { two_stage, ..OctreeOptions::default() };
+        Ok(Box::new(OctreeGpu::with_options(gpu, mesh, options)?) as Box<dyn GpuMethod>)
+    };
+    let built = match method {
+        "grid" => grid(gpu, None),
+        "octree-single" => octree(gpu, false),
+        "octree" => octree(gpu, true),
+        _ => grid(gpu, Some(tuning.cell_factor.unwrap_or(CELL_FACTOR) as f32)),
+    };
+    built.map_err(|error| match error {
+        GpuError::Query(error) => error,
+        error => DetectError::Device { detector: method, reason: error.to_string() },
+    })
 }
 
 /// How many are kept.
@@ -73,7 +86,7 @@ struct Entry {
     method: &'static str,
     tuning: Tuning,
     mesh: CollisionMesh,
-    built: GpuMethod,
+    built: Box<dyn GpuMethod>,
 }
 
 impl Kept {
@@ -90,7 +103,7 @@ impl Kept {
         mesh: &CollisionMesh,
         method: &'static str,
         tuning: &Tuning,
-    ) -> Result<&mut GpuMethod, DetectError> {
+    ) -> Result<&mut dyn GpuMethod, DetectError> {
         let known = |e: &Entry| e.method == method && e.tuning == *tuning && e.mesh == *mesh;
         let entry = if let Some(at) = self.entries.iter().position(known) {
             self.entries.remove(at)
@@ -98,11 +111,11 @@ impl Kept {
             // Room on the device before what needs it.
             self.entries.truncate(KEPT - 1);
             self.built += 1;
-            let built = GpuMethod::new(gpu.clone(), mesh, method, tuning)?;
+            let built = build(gpu.clone(), mesh, method, tuning)?;
             Entry { method, tuning: *tuning, mesh: mesh.clone(), built }
         };
         self.entries.insert(0, entry);
-        Ok(&mut self.entries[0].built)
+        Ok(self.entries[0].built.as_mut())
     }
 }
 
@@ -110,7 +123,7 @@ impl Kept {
 mod tests {
     use super::*;
     use crate::Vec3;
-    use crate::collision::Mode;
+    use crate::collision::{Mode, Query};
     use crate::device::{Device, SharedGpu};
 
     static SHARED: SharedGpu = SharedGpu::new(true);

@@ -33,6 +33,7 @@ use crate::layout::{Entry, LengthParams, OctreeParams, SceneParams};
 use crate::limits::{MAX_LEVELS, PAGE_LEVELS, TALLY_LENGTH, WORKGROUP};
 use crate::recorder::Recorder;
 use crate::stages::bounds::Scene;
+use crate::stages::compact::Compact;
 use crate::stages::pairs::Entries;
 use crate::stages::scan::Scan;
 use crate::stages::sort::Sort;
@@ -40,14 +41,15 @@ pub use levels::{Levels, Thresholds, next_levels};
 use std::sync::Arc;
 
 /// Most workgroups that share the pages.
-const PAGE_GROUPS: u32 = 4096;
+const PAGE_GROUPS: u32 = 2048;
 /// A root's side is at least the longest one over this: cells much flatter than triangles would hold each triangle many times.
 const FLATTEST: f32 = 8.0;
 
 /// The octree of a scene and the registrations in its leaves, sorted by leaf.
 #[derive(Debug)]
 pub struct Octree {
-    kernels: [Arc<Kernel>; 9],
+    kernels: [Arc<Kernel>; 10],
+    compact: Compact,
     scan: Scan<u32>,
     scan_wide: Scan<[u32; 2]>,
     sort: Sort,
@@ -67,6 +69,13 @@ pub struct Octree {
     pub cursors: Array<u32>,
     /// Triangles of the pages.
     pub members: Array<u32>,
+    /// Which pages have trees below them.
+    pub flags: Array<u32>,
+    numbers: Array<u32>,
+    /// How many of them before each page.
+    pub selected_before: Array<u32>,
+    /// Those that have.
+    pub selected: Array<u32>,
     /// Tests per cell of the dense levels.
     pub costs: Array<[u32; 2]>,
     /// Which cells of the pages are divided.
@@ -90,7 +99,7 @@ pub struct Octree {
 }
 
 /// The texts of the kernels, in the order in which they run; the last but two and the last but one differ by a switch.
-pub fn sources() -> [Source; 9] {
+pub fn sources() -> [Source; 10] {
     let plain = |name, text| Source::new(name, text).include(include_str!("../../../shaders/octree.wgsl"));
     let find = |name, text| plain(name, text).include(include_str!("../../../shaders/octree_find.wgsl"));
     let register = || find("octree_register", include_str!("../../../shaders/octree_register.wgsl"));
@@ -98,6 +107,7 @@ pub fn sources() -> [Source; 9] {
         plain("octree_ranges", include_str!("../../../shaders/octree_ranges.wgsl")),
         find("octree_assign", include_str!("../../../shaders/octree_assign.wgsl")),
         find("octree_place", include_str!("../../../shaders/octree_place.wgsl")),
+        plain("octree_select", include_str!("../../../shaders/octree_select.wgsl")),
         plain("octree_pages", include_str!("../../../shaders/octree_pages.wgsl")),
         plain("octree_merge", include_str!("../../../shaders/octree_merge.wgsl")),
         plain("octree_descend", include_str!("../../../shaders/octree_descend.wgsl")),
@@ -171,6 +181,7 @@ impl Octree {
         let Ok(kernels) = kernels.try_into() else { unreachable!("as many kernels as texts") };
         Ok(Self {
             kernels,
+            compact: Compact::new(gpu)?,
             scan: Scan::new(gpu)?,
             scan_wide: Scan::new(gpu)?,
             sort: Sort::new(gpu)?,
@@ -183,6 +194,10 @@ impl Octree {
             firsts: Array::new(gpu, "first members", 1)?,
             cursors: Array::new(gpu, "members placed", 1)?,
             members: Array::new(gpu, "members of pages", capacity)?,
+            flags: Array::new(gpu, "pages with trees", 1)?,
+            numbers: Array::new(gpu, "numbers of pages", 1)?,
+            selected_before: Array::new(gpu, "trees before each page", 1)?,
+            selected: Array::new(gpu, "selected pages", 1)?,
             costs: Array::new(gpu, "tests per cell", 1)?,
             types: Array::new(gpu, "types within pages", 1)?,
             kinds: Array::new(gpu, "type tree", 1)?,
@@ -240,7 +255,7 @@ impl Octree {
         recorder.stage("counter tree");
         self.record_counts(recorder, scene, &params)?;
         recorder.stage("bottom-up");
-        self.record_types(recorder, &params);
+        self.record_types(recorder, &params)?;
         recorder.stage("registrations");
         self.record_registrations(recorder, &params)?;
         recorder.stage("sort");
@@ -259,7 +274,7 @@ impl Octree {
             &self.entries.raw,
             &self.tally.raw,
         ];
-        recorder.dispatch(&self.kernels[8], &lengths, &arrays, length.most.div_ceil(WORKGROUP));
+        recorder.dispatch(&self.kernels[9], &lengths, &arrays, length.most.div_ceil(WORKGROUP));
         Ok(())
     }
 
@@ -269,10 +284,15 @@ impl Octree {
             array.grow(gpu, nodes(page))?;
         }
         self.costs.grow(gpu, nodes(page))?;
-        self.firsts.grow(gpu, pages + 1)?;
-        self.cursors.grow(gpu, pages)?;
-        self.types.grow(gpu, 3 * pages)?;
-        self.leaves.grow(gpu, pages)
+        for array in [&mut self.firsts, &mut self.selected_before] {
+            array.grow(gpu, pages + 1)?;
+        }
+        for array in
+            [&mut self.cursors, &mut self.leaves, &mut self.flags, &mut self.numbers, &mut self.selected]
+        {
+            array.grow(gpu, pages)?;
+        }
+        self.types.grow(gpu, 3 * pages)
     }
 
     fn record_counts(
@@ -298,26 +318,40 @@ impl Octree {
         Ok(())
     }
 
-    fn record_types(&self, recorder: &mut Recorder<'_>, params: &OctreeParams) {
+    fn record_types(&mut self, recorder: &mut Recorder<'_>, params: &OctreeParams) -> Result<(), GpuError> {
         let pages = 1u32 << (3 * params.page);
+        let arrays = [&self.counts.raw, &self.flags.raw, &self.numbers.raw, &self.costs.raw, &self.types.raw];
+        recorder.dispatch(&self.kernels[3], params, &arrays, pages.div_ceil(WORKGROUP));
+        let length = Length::host(pages);
+        self.compact.record(
+            recorder,
+            &self.flags,
+            &self.numbers,
+            length,
+            &self.selected_before,
+            &self.selected,
+        )?;
         let arrays = [
             &self.ranges.raw,
             &self.counts.raw,
             &self.firsts.raw,
             &self.members.raw,
+            &self.selected.raw,
+            &self.selected_before.raw,
             &self.costs.raw,
             &self.types.raw,
         ];
         let most = recorder.gpu().max_workgroups.saturating_pow(2).min(PAGE_GROUPS);
-        recorder.dispatch(&self.kernels[3], params, &arrays, pages.min(most));
+        recorder.dispatch(&self.kernels[4], params, &arrays, pages.min(most));
         for level in (params.top..params.page).rev() {
             let arrays = [&self.counts.raw, &self.costs.raw, &self.kinds.raw];
             let groups = (1u32 << (3 * level)).div_ceil(WORKGROUP);
-            recorder.dispatch(&self.kernels[4], &OctreeParams { level, ..*params }, &arrays, groups);
+            recorder.dispatch(&self.kernels[5], &OctreeParams { level, ..*params }, &arrays, groups);
         }
         recorder.stage("top-down");
         let arrays = [&self.kinds.raw, &self.leaves.raw];
-        recorder.dispatch(&self.kernels[5], params, &arrays, pages.div_ceil(WORKGROUP));
+        recorder.dispatch(&self.kernels[6], params, &arrays, pages.div_ceil(WORKGROUP));
+        Ok(())
     }
 
     fn record_registrations(
@@ -328,11 +362,11 @@ impl Octree {
         let groups = params.room.div_ceil(WORKGROUP);
         let tree = [&self.ranges.raw, &self.offsets.raw, &self.leaves.raw, &self.types.raw];
         let arrays = [&tree[..], &[&self.counted.raw]].concat();
-        recorder.dispatch(&self.kernels[6], params, &arrays, groups);
+        recorder.dispatch(&self.kernels[7], params, &arrays, groups);
         self.scan_wide.record(recorder, &self.counted, Length::host(params.room), &self.sums)?;
         let tree = [&self.ranges.raw, &self.offsets.raw, &self.leaves.raw, &self.types.raw];
         let arrays = [&tree[..], &[&self.sums.raw, &self.keys.raw, &self.registered.raw]].concat();
-        recorder.dispatch(&self.kernels[7], params, &arrays, groups);
+        recorder.dispatch(&self.kernels[8], params, &arrays, groups);
         Ok(())
     }
 
@@ -344,6 +378,10 @@ impl Octree {
             &self.firsts,
             &self.cursors,
             &self.members,
+            &self.flags,
+            &self.numbers,
+            &self.selected_before,
+            &self.selected,
             &self.types,
             &self.kinds,
             &self.leaves,
