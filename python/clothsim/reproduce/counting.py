@@ -17,7 +17,7 @@ from clothsim.reproduce.contract import Check, Effort
 
 __all__ = [
     "GRID", "METHODS", "OCTREE", "SINGLE", "VIRTUAL", "Counted", "agreement", "bars", "chosen", "count", "device_words",
-    "foot", "left_out", "logarithmic", "million", "scenes", "shares",
+    "foot", "left_out", "logarithmic", "million", "plain", "scenes", "shares",
 ]  # fmt: skip
 
 GRID, VIRTUAL = "grid", "virtual-subdivision"
@@ -153,6 +153,11 @@ def device_words(device: str) -> str:
 def million(tests: float) -> str:
     """A count in words."""
     return f"{tests / 1e6:.3g} M" if tests < 1e9 else f"{tests / 1e6:,.0f} M"
+
+
+def plain(number: float) -> str:
+    """Three digits, without an exponent."""
+    return f"{number:,.0f}" if number >= 1000.0 else f"{number:.3g}"
 
 
 def shares(seconds: Mapping[str, float], groups: Mapping[str, Sequence[str]]) -> dict[str, float]:

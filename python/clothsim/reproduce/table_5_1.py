@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from clothsim.reproduce.contract import Check, Effort, Table
-from clothsim.reproduce.counting import VIRTUAL, device_words, left_out
+from clothsim.reproduce.counting import VIRTUAL, device_words, left_out, plain
 from clothsim.reproduce.timings import MODES, Times, draw_times, times
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
@@ -51,7 +51,7 @@ def tables(measured: Times) -> Mapping[str, Table]:
 def here(measured: Times) -> str:
     """Milliseconds per benchmark."""
     words = [
-        f"{b.name} {' and '.join(f'{measured.milliseconds(b.name, VIRTUAL, mode):.3g}' for mode in MODES)}"
+        f"{b.name} {' and '.join(plain(measured.milliseconds(b.name, VIRTUAL, mode)) for mode in MODES)}"
         for b in measured.suite.benchmarks
     ]
     return left_out(measured.suite, f"{', '.join(words)} ms; {device_words(measured.device)}")

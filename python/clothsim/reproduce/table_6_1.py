@@ -67,7 +67,7 @@ def measure(effort: Effort) -> Measured:
                 step = min(number, len(b.steps) - 1)
                 d = collision.detect(*b.steps[step], b.triangles, OCTREE, device="gpu", threads=effort.threads)
                 rows.append([float(d.stats[f"registrations_level_{level}"]) for level in range(LEVELS)])
-                bases[b.name].append(int(d.stats.get("finest_level", d.stats.get("base_level"))))
+                bases[b.name].append(int(d.stats["finest_level"]))
                 differing += not np.array_equal(
                     d.edge_edge, b.on_cpu("continuous", step, effort.threads).edge_edge
                 )  # fmt: skip

@@ -21,6 +21,7 @@ from clothsim.reproduce.counting import (
     foot,
     left_out,
     logarithmic,
+    plain,
     scenes,
     shares,
 )
@@ -125,7 +126,7 @@ def draw_times(
             each = [measured.milliseconds(name, method, mode) for name in names]
             axis.bar(np.arange(len(names)) + shift, each, 0.94 * width, color=METHODS[method], label=method)
             for k, b in enumerate(measured.suite.benchmarks):
-                axis.text(k + shift, each[k], f"{each[k]:.3g}", ha="center", va="bottom", fontsize=8.5)
+                axis.text(k + shift, each[k], plain(each[k]), ha="center", va="bottom", fontsize=8.5)
                 if b.thesis in printed.get(method, {}):
                     ends = k + shift - 0.47 * width, k + shift + 0.47 * width
                     value = printed[method][b.thesis][column]
@@ -171,7 +172,7 @@ class Parts:
     def here(self) -> str:
         """The shares."""
         words = ", ".join(f"{group} {share:.0f} %" for group, share in self.shares.items())
-        text = f"{self.name}: {words} of {self.counted.milliseconds:.3g} ms; {device_words(self.counted.device)}"
+        text = f"{self.name}: {words} of {plain(self.counted.milliseconds)} ms; {device_words(self.counted.device)}"
         return text if self.is_shown else left_out(self.suite, text)
 
     def checks(self) -> list[Check]:
@@ -216,7 +217,7 @@ def draw_parts(measured: Parts, printed: Mapping[str, float], title: str, note: 
     of = {stage: group for group, stages in measured.groups.items() for stage in stages}
     for k, (stage, s) in enumerate(measured.counted.seconds.items()):
         right.barh(k, 1e3 * s, 0.62, color=colours[of.get(stage, "other")])
-        right.text(1e3 * s, k, f" {1e3 * s:.3g}", va="center", fontsize=9.5)
+        right.text(1e3 * s, k, f" {plain(1e3 * s)}", va="center", fontsize=9.5)
     right.set_yticks(range(len(measured.counted.seconds)), list(measured.counted.seconds))
     for axis in (left, right):
         axis.invert_yaxis()

@@ -17,6 +17,21 @@ pub(crate) trait GpuMethod: Detector + std::fmt::Debug {
     fn counted(&self) -> Vec<(&'static str, u64)>;
 }
 
+/// Names of an octree's registrations by level, the root first.
+const BY_LEVEL: [&str; 11] = [
+    "registrations_level_0",
+    "registrations_level_1",
+    "registrations_level_2",
+    "registrations_level_3",
+    "registrations_level_4",
+    "registrations_level_5",
+    "registrations_level_6",
+    "registrations_level_7",
+    "registrations_level_8",
+    "registrations_level_9",
+    "registrations_level_10",
+];
+
 impl GpuMethod for GridGpu {
     fn bytes(&self) -> u64 {
         Self::bytes(self)
@@ -33,13 +48,16 @@ impl GpuMethod for OctreeGpu {
     }
 
     fn counted(&self) -> Vec<(&'static str, u64)> {
-        let OctreeCounts { levels: [coarsest, finest], registrations, leaves, .. } = Self::counted(self);
-        vec![
+        let OctreeCounts { levels: [coarsest, finest], registrations, leaves, per_level } =
+            Self::counted(self);
+        let mut counts = vec![
             ("registrations", registrations),
             ("leaves", leaves),
             ("coarsest_level", coarsest.into()),
             ("finest_level", finest.into()),
-        ]
+        ];
+        counts.extend(BY_LEVEL.into_iter().zip(per_level.map(u64::from)));
+        counts
     }
 }
 
