@@ -35,15 +35,15 @@ OCTREE_GROUPS = {
     "update of BVs": ("bounds",),
     "building the octree": ("counter tree", "bottom-up", "top-down"),
     "assignment, sort": ("registrations", "sort", "gather"),
-    "broad phase": ("workload", "triangle pairs", "feature pairs"),
-    "narrow phase": ("narrow phase",),
+    "broad phase": ("workload", "owners of tests", "triangle pairs", "feature pairs"),
+    "narrow phase": ("narrow filter", "narrow phase"),
 }
 GROUPS = {
     "update of BVs": ("bounds",),
     "subdivision, assignment": ("subdivision", "cells"),
     "sort, removal": ("sort", "gather"),
-    "broad phase": ("workload", "triangle pairs", "feature pairs"),
-    "narrow phase": ("narrow phase",),
+    "broad phase": ("workload", "owners of tests", "triangle pairs", "feature pairs"),
+    "narrow phase": ("narrow filter", "narrow phase"),
 }
 
 

@@ -2,7 +2,7 @@
 
 use super::Tuning;
 use crate::collision::{CollisionMesh, DetectError, Detector};
-use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions, OctreeCounts, OctreeGpu, OctreeOptions};
+use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions, OctreeGpu, OctreeOptions};
 use std::sync::Arc;
 
 /// λ of virtual subdivision where nothing else is asked for (thesis 5.3).
@@ -48,15 +48,8 @@ impl GpuMethod for OctreeGpu {
     }
 
     fn counted(&self) -> Vec<(&'static str, u64)> {
-        let OctreeCounts { levels: [coarsest, finest], registrations, leaves, per_level } =
-            Self::counted(self);
-        let mut counts = vec![
-            ("registrations", registrations),
-            ("leaves", leaves),
-            ("coarsest_level", coarsest.into()),
-            ("finest_level", finest.into()),
-        ];
-        counts.extend(BY_LEVEL.into_iter().zip(per_level.map(u64::from)));
+        let mut counts = Self::counted(self).to_vec();
+        counts.extend(BY_LEVEL.into_iter().zip(self.per_level().iter().map(|&n| u64::from(n))));
         counts
     }
 }
