@@ -1,12 +1,11 @@
 //! The narrow phase of a traversal: candidates in, contacts out.
 
 use super::traverse::{Candidates, Sink};
-use crate::ccd::filter::{
-    Row, filter, four_edge_edges_apart, four_edge_edges_maybe_apart, four_vertex_triangles_apart,
-    four_vertex_triangles_maybe_apart, row,
-};
-use crate::ccd::{edge_edge_march, vertex_triangle_march};
-use crate::{CollisionMesh, Contacts, Mode, Query, Vec3};
+use crate::ccd::batch::Batch;
+use crate::ccd::filter::{Row, row};
+use crate::ccd::instructions::Instructions;
+use crate::ccd::lanes::Rows;
+use crate::{CollisionMesh, Contacts, Mode, Query, StencilKind};
 use cloth_mesh::NONE;
 
 /// Both ends of a vertex's motion, in one cache line.
@@ -39,14 +38,10 @@ impl<'a> Scene<'a> {
     }
 
     #[inline]
-    fn rows(&self, vertices: [u32; 4]) -> [&Row; 8] {
-        let motion = |k: usize| &self.motion[vertices[k] as usize].0;
-        let (a, b, c, d) = (motion(0), motion(1), motion(2), motion(3));
+    fn rows(&self, vertices: [u32; 4]) -> Rows<'_> {
+        let (a, b) = (&self.motion[vertices[0] as usize].0, &self.motion[vertices[1] as usize].0);
+        let (c, d) = (&self.motion[vertices[2] as usize].0, &self.motion[vertices[3] as usize].0);
         [&a[0], &b[0], &c[0], &d[0], &a[1], &b[1], &c[1], &d[1]]
-    }
-
-    fn points(&self, vertices: [u32; 4]) -> [Vec3; 8] {
-        self.rows(vertices).map(|row| Vec3::new(row[0], row[1], row[2]))
     }
 }
 
@@ -56,7 +51,7 @@ type Pair = ([u32; 2], [u32; 4]);
 pub(crate) struct Narrow<'a> {
     scene: &'a Scene<'a>,
     waiting: Vec<Pair>,
-    left: Vec<Pair>,
+    batch: Batch,
     vertex_triangle: Vec<([u32; 2], f64)>,
     edge_edge: Vec<([u32; 2], f64)>,
     candidates_vertex_triangle: u64,
@@ -69,7 +64,7 @@ impl<'a> Narrow<'a> {
         Self {
             scene,
             waiting: vec![],
-            left: vec![],
+            batch: Batch::default(),
             vertex_triangle: vec![],
             edge_edge: vec![],
             candidates_vertex_triangle: 0,
@@ -79,14 +74,36 @@ impl<'a> Narrow<'a> {
     }
 }
 
+impl Narrow<'_> {
+    /// Decides the waiting pairs: their contacts.
+    fn decide(&mut self, kind: StencilKind) {
+        let Self { scene, waiting, batch, .. } = self;
+        let rows = |pair: u32| scene.rows(waiting[pair as usize].1);
+        let thickness = scene.query.thickness;
+        let left = batch.decide(Instructions::widest(), kind, waiting.len(), rows, thickness);
+        self.root_searches += left as u64;
+        let is_continuous = scene.query.mode == Mode::Continuous;
+        let contacts = batch
+            .contacts()
+            .map(|(pair, time)| (waiting[pair as usize].0, if is_continuous { time } else { 1.0 }));
+        match kind {
+            StencilKind::VertexTriangle => {
+                self.candidates_vertex_triangle += waiting.len() as u64;
+                self.vertex_triangle.extend(contacts);
+            }
+            StencilKind::EdgeEdge => {
+                self.candidates_edge_edge += waiting.len() as u64;
+                self.edge_edge.extend(contacts);
+            }
+        }
+        waiting.clear();
+    }
+}
+
 impl Sink for Narrow<'_> {
     fn take(&mut self, candidates: &mut Candidates) {
-        let Self { scene, waiting, left, .. } = self;
-        let (mesh, thickness) = (scene.mesh, scene.query.thickness);
-        let rows = |pair: &Pair| scene.rows(pair.1);
-        let time = |t: f64| if scene.query.mode == Mode::Continuous { t } else { 1.0 };
-
-        waiting.clear();
+        let Self { scene, waiting, .. } = self;
+        let mesh = scene.mesh;
         for [v, t] in candidates.vertex_triangle.drain(..) {
             if v != NONE && t != NONE {
                 let [a, b, c] = mesh.triangles[t as usize];
@@ -95,22 +112,9 @@ impl Sink for Narrow<'_> {
                 }
             }
         }
-        self.candidates_vertex_triangle += waiting.len() as u64;
-        left.clear();
-        filter(waiting, rows, |r| four_vertex_triangles_maybe_apart(r, thickness), |pair| left.push(pair));
-        filter(
-            left,
-            rows,
-            |r| four_vertex_triangles_apart(r, thickness),
-            |(pair, vertices)| {
-                self.root_searches += 1;
-                if let Some(t) = vertex_triangle_march(&scene.points(vertices), thickness) {
-                    self.vertex_triangle.push((pair, time(t)));
-                }
-            },
-        );
+        self.decide(StencilKind::VertexTriangle);
 
-        waiting.clear();
+        let Self { scene, waiting, .. } = self;
         for [e, f] in candidates.edge_edge.drain(..) {
             if e != NONE && f != NONE {
                 let pair = [e.min(f), e.max(f)];
@@ -120,20 +124,7 @@ impl Sink for Narrow<'_> {
                 }
             }
         }
-        self.candidates_edge_edge += waiting.len() as u64;
-        left.clear();
-        filter(waiting, rows, |r| four_edge_edges_maybe_apart(r, thickness), |pair| left.push(pair));
-        filter(
-            left,
-            rows,
-            |r| four_edge_edges_apart(r, thickness),
-            |(pair, vertices)| {
-                self.root_searches += 1;
-                if let Some(t) = edge_edge_march(&scene.points(vertices), thickness) {
-                    self.edge_edge.push((pair, time(t)));
-                }
-            },
-        );
+        self.decide(StencilKind::EdgeEdge);
     }
 }
 

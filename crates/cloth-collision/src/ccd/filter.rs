@@ -7,13 +7,14 @@
 //! Source: E. G. Gilbert, "An Iterative Procedure for Computing the Minimum of a Quadratic Form on a Convex Set", 1966.
 
 use super::ROUNDING;
+pub(crate) use super::lanes::Row;
 use super::lanes::{Lanes, Vector};
-use crate::Vec3;
+use crate::{StencilKind, Vec3};
 
 /// Directions of Gilbert's algorithm that are tried with every candidate, by measurement.
-const FEW: usize = 2;
+pub(crate) const FEW: usize = 2;
 /// Directions that are tried with what is left then: more cost more than the exact searches that they save.
-const MANY: usize = 8;
+pub(crate) const MANY: usize = 8;
 
 /// Directions for features at rest.
 const AT_REST: usize = 3;
@@ -50,20 +51,22 @@ pub(crate) fn determinant<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Ve
     (b, error)
 }
 
-/// Where the vertex certainly stays farther than `thickness` from the triangle during the step.
+/// Where the features certainly stay farther than `thickness` apart during the step, as `STEPS` directions or the cubic
+/// show.
 #[inline(always)]
-pub(crate) fn vertex_triangle_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    vertex_triangle::<L, MANY>(p, thickness)
+pub(crate) fn apart<L: Lanes, const STEPS: usize>(
+    kind: StencilKind,
+    p: &Points<L>,
+    thickness: f64,
+) -> L::Mask {
+    match kind {
+        StencilKind::VertexTriangle => vertex_triangle_apart::<L, STEPS>(p, thickness),
+        StencilKind::EdgeEdge => edge_edge_apart::<L, STEPS>(p, thickness),
+    }
 }
 
-/// [`vertex_triangle_apart`] with less effort.
 #[inline(always)]
-fn vertex_triangle_maybe_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    vertex_triangle::<L, FEW>(p, thickness)
-}
-
-#[inline(always)]
-fn vertex_triangle<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
+fn vertex_triangle_apart<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
     let d = [p[1] - p[0], p[2] - p[0], p[3] - p[0], p[5] - p[4], p[6] - p[4], p[7] - p[4]];
     let apart = separated::<L, 6, STEPS>(&d, thickness);
     if thickness > 0.0 {
@@ -72,20 +75,8 @@ fn vertex_triangle<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) 
     apart | rootless(determinant([d[0], d[3]], [d[1], d[4]], [d[2], d[5]]))
 }
 
-/// Where the edges certainly stay farther than `thickness` apart during the step.
 #[inline(always)]
-pub(crate) fn edge_edge_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    edge_edge::<L, MANY>(p, thickness)
-}
-
-/// [`edge_edge_apart`] with less effort.
-#[inline(always)]
-fn edge_edge_maybe_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    edge_edge::<L, FEW>(p, thickness)
-}
-
-#[inline(always)]
-fn edge_edge<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
+fn edge_edge_apart<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
     let d = [
         p[0] - p[2],
         p[0] - p[3],
@@ -165,9 +156,6 @@ fn edge_edge_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
     separated::<L, 4, AT_REST>(&[p[0] - p[2], p[0] - p[3], p[1] - p[2], p[1] - p[3]], thickness)
 }
 
-/// A point with a fourth entry of no meaning, so that it fills a register.
-pub(crate) type Row = [f64; 4];
-
 /// Copies positions into rows.
 pub(crate) fn row(x: &Vec3) -> Row {
     [x.x, x.y, x.z, 0.0]
@@ -194,6 +182,7 @@ macro_rules! four_at_once {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
         fn $avx(rows: &[[&Row; $points]; 4], thickness: f64) -> u32 {
+            use super::lanes::Mask;
             use super::lanes::avx::Four;
             let mut points = [Vector([Four::splat(0.0); 3]); $points];
             for k in 0..$points {
@@ -206,15 +195,6 @@ macro_rules! four_at_once {
         }
     };
 }
-four_at_once!(
-    four_vertex_triangles_maybe_apart,
-    four_vertex_triangles_maybe_apart_avx2,
-    vertex_triangle_maybe_apart,
-    8
-);
-four_at_once!(four_edge_edges_maybe_apart, four_edge_edges_maybe_apart_avx2, edge_edge_maybe_apart, 8);
-four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, vertex_triangle_apart, 8);
-four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart, 8);
 four_at_once!(four_vertex_triangles_beyond, four_vertex_triangles_beyond_avx2, vertex_triangle_beyond, 4);
 four_at_once!(four_edge_edges_beyond, four_edge_edges_beyond_avx2, edge_edge_beyond, 4);
 
@@ -262,9 +242,4 @@ pub(crate) fn in_lanes<'a, T: Copy, R: 'a, A: Copy, const N: usize, const LANES:
     for (lane, &item) in rest.iter().enumerate() {
         each(item, answer, lane);
     }
-}
-
-/// One pair.
-pub(crate) fn points(p: &[Vec3; 8]) -> Points<f64> {
-    p.map(Vector::from)
 }
