@@ -1,10 +1,12 @@
 //! Decides many pairs: the filters, then the march of those that they leave.
 
+use super::coarse;
 use super::edge_edge::EdgeEdgeMotion;
-use super::filter::{FEW, MANY, apart};
+use super::filter;
 use super::instructions::{Instructions, Kernel};
-use super::lanes::{Doubles, Mask, Rows};
+use super::lanes::{Doubles, MAX_SINGLES, Mask, Singles, SmallRow, Vector};
 use super::march::{NEVER, march, points};
+use super::motions::Motions;
 use super::vertex_triangle::VertexTriangleMotion;
 use crate::StencilKind;
 
@@ -16,22 +18,19 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Decides the pairs 0..`count` with the single-pair tests' answers. `rows` names a pair's points,
-    /// all finite. Returns how many the filters have left; [`Batch::contacts`] are among these.
+    /// Decides the pairs with these `vertices`, with the single-pair tests' answers. Returns how many the filters have
+    /// left; [`Batch::contacts`] are among these.
     #[inline]
-    pub(crate) fn decide<'a>(
+    pub(crate) fn decide(
         &mut self,
         instructions: Instructions,
         kind: StencilKind,
-        count: usize,
-        rows: impl Fn(u32) -> Rows<'a>,
-        thickness: f64,
+        motions: &Motions,
+        vertices: &[[u32; 4]],
     ) -> usize {
-        self.pairs.clear();
-        self.pairs.extend(0..count as u32);
         self.times.clear();
-        self.times.resize(count, NEVER);
-        instructions.run(Decide { kind, rows, thickness, batch: self })
+        self.times.resize(vertices.len(), NEVER);
+        instructions.run(Decide { kind, motions, vertices, batch: self })
     }
 
     /// The pairs in contact, in their order, with their times.
@@ -40,22 +39,24 @@ impl Batch {
     }
 }
 
-struct Decide<'b, R> {
+struct Decide<'b> {
     kind: StencilKind,
-    rows: R,
-    thickness: f64,
+    motions: &'b Motions,
+    vertices: &'b [[u32; 4]],
     batch: &'b mut Batch,
 }
 
-impl<'a, R: Fn(u32) -> Rows<'a>> Kernel for Decide<'_, R> {
+impl Kernel for Decide<'_> {
     type Answer = usize;
 
     #[inline(always)]
-    fn run<D: Doubles>(self) -> usize {
-        let Self { kind, rows, thickness, batch: Batch { pairs, times } } = self;
-        keep_possible::<D, FEW>(kind, &rows, thickness, pairs);
-        keep_possible::<D, MANY>(kind, &rows, thickness, pairs);
+    fn run<D: Doubles, S: Singles>(self) -> usize {
+        let Self { kind, motions, vertices, batch: Batch { pairs, times } } = self;
+        let thickness = motions.thickness;
+        coarse_filter::<S>(kind, motions, vertices, pairs);
+        fine_filter::<D>(kind, motions, vertices, pairs);
         let left = pairs.len();
+        let rows = |pair: u32| motions.rows(&vertices[pair as usize]);
         match kind {
             StencilKind::VertexTriangle => {
                 march::<D, VertexTriangleMotion<D>, 3>(rows, thickness, pairs, times);
@@ -66,19 +67,50 @@ impl<'a, R: Fn(u32) -> Rows<'a>> Kernel for Decide<'_, R> {
     }
 }
 
-/// Keeps the pairs that `STEPS` directions and the cubic do not show to be apart.
+/// Lists the pairs that [`coarse`] does not show to be apart.
 #[inline(always)]
-fn keep_possible<'a, D: Doubles, const STEPS: usize>(
+fn coarse_filter<S: Singles>(
     kind: StencilKind,
-    rows: &impl Fn(u32) -> Rows<'a>,
-    thickness: f64,
+    motions: &Motions,
+    vertices: &[[u32; 4]],
     pairs: &mut Vec<u32>,
 ) {
+    static ORIGIN: SmallRow = [0.0; 8];
+    pairs.clear();
+    pairs.resize(vertices.len(), 0);
+    let mut kept = 0;
+    let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
+    for (group, vertices) in vertices.chunks(S::COUNT).enumerate() {
+        for lane in 0..S::COUNT {
+            rows[lane] = motions.small_rows(&vertices[lane.min(vertices.len() - 1)]);
+        }
+        let mut points = [Vector([S::splat(0.0); 3]); 8];
+        for k in 0..4 {
+            [points[k], points[k + 4]] = S::gather(&rows, k);
+        }
+        let apart = coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT).bits();
+        for lane in 0..vertices.len() {
+            pairs[kept] = (group * S::COUNT + lane) as u32;
+            kept += (!apart >> lane & 1) as usize;
+        }
+    }
+    pairs.truncate(kept);
+}
+
+/// Keeps the pairs that [`filter`] does not show to be apart.
+#[inline(always)]
+fn fine_filter<D: Doubles>(
+    kind: StencilKind,
+    motions: &Motions,
+    vertices: &[[u32; 4]],
+    pairs: &mut Vec<u32>,
+) {
+    let rows = |pair: u32| motions.rows(&vertices[pair as usize]);
     let (mut kept, mut first) = (0, 0);
     while first < pairs.len() {
         let count = D::COUNT.min(pairs.len() - first);
-        let points = points::<D>(rows, &pairs[first..first + count]);
-        let apart = apart::<D, STEPS>(kind, &points, thickness).bits();
+        let points = points::<D>(&rows, &pairs[first..first + count]);
+        let apart = filter::apart::<D>(kind, &points, motions.thickness).bits();
         for lane in 0..count {
             pairs[kept] = pairs[first + lane];
             kept += (!apart >> lane & 1) as usize;

@@ -15,6 +15,7 @@
 //! One pair or many ([`batch`]): the same code over one lane or several ([`lanes`], [`instructions`]), the same bits.
 
 pub(crate) mod batch;
+mod coarse;
 mod cubic;
 mod edge_edge;
 pub(crate) mod filter;
@@ -23,12 +24,13 @@ pub(crate) mod lanes;
 #[cfg(test)]
 mod lanes_agree;
 mod march;
+pub(crate) mod motions;
 mod separation;
 mod vertex_triangle;
 
 use crate::{StencilKind, Vec3};
 use edge_edge::EdgeEdgeMotion;
-use filter::{MANY, apart, row};
+use filter::{apart, row};
 use lanes::Vector;
 use march::{NEVER, march};
 use vertex_triangle::VertexTriangleMotion;
@@ -61,7 +63,7 @@ fn one(kind: StencilKind, p: &[Vec3; 8], thickness: f64) -> Option<f64> {
     if !p.iter().all(|p| p.x.is_finite() && p.y.is_finite() && p.z.is_finite()) {
         return Some(0.0);
     }
-    if apart::<f64, MANY>(kind, &p.map(Vector::from), thickness) {
+    if apart::<f64>(kind, &p.map(Vector::from), thickness) {
         return None;
     }
     let rows = p.each_ref().map(row);

@@ -1,7 +1,10 @@
 //! Four doubles or eight singles in an AVX register. Values exist only in functions compiled for AVX2, which the methods
 //! are inlined into.
 
-use super::{Doubles, EXPONENT, Lanes, MAX_DOUBLES, Mask, Row, Rows, TWO_BIASES, Vector};
+use super::{
+    Doubles, EXPONENT, Lanes, MAX_DOUBLES, MAX_SINGLES, Mask, Row, Rows, Singles, SmallRow, TWO_BIASES,
+    Vector,
+};
 use std::arch::x86_64 as arch;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
@@ -200,6 +203,46 @@ impl Doubles for Four {
                 arch::_mm256_set1_epi64x(TWO_BIASES),
                 exponent,
             )))
+        }
+    }
+}
+
+// SAFETY of the block below: as those of `Lanes`.
+impl Singles for Eight {
+    const COUNT: usize = 8;
+
+    #[inline(always)]
+    fn gather(rows: &[[&SmallRow; 4]; MAX_SINGLES], k: usize) -> [Vector<Self>; 2] {
+        // SAFETY: see above; 32 readable bytes in each row.
+        unsafe {
+            let mut x = [arch::_mm256_setzero_ps(); 2];
+            let (mut y, mut z) = (x, x);
+            // Four rows at a time: both ends' coordinates, t0 in the lower half of the register.
+            for half in 0..2 {
+                let [a, b, c, d] = [
+                    arch::_mm256_loadu_ps(rows[4 * half][k].as_ptr()),
+                    arch::_mm256_loadu_ps(rows[4 * half + 1][k].as_ptr()),
+                    arch::_mm256_loadu_ps(rows[4 * half + 2][k].as_ptr()),
+                    arch::_mm256_loadu_ps(rows[4 * half + 3][k].as_ptr()),
+                ];
+                let (ab_xy, ab_z) = (arch::_mm256_unpacklo_ps(a, b), arch::_mm256_unpackhi_ps(a, b));
+                let (cd_xy, cd_z) = (arch::_mm256_unpacklo_ps(c, d), arch::_mm256_unpackhi_ps(c, d));
+                x[half] = arch::_mm256_shuffle_ps::<0x44>(ab_xy, cd_xy);
+                y[half] = arch::_mm256_shuffle_ps::<0xee>(ab_xy, cd_xy);
+                z[half] = arch::_mm256_shuffle_ps::<0x44>(ab_z, cd_z);
+            }
+            [
+                Vector([
+                    Self(arch::_mm256_permute2f128_ps::<0x20>(x[0], x[1])),
+                    Self(arch::_mm256_permute2f128_ps::<0x20>(y[0], y[1])),
+                    Self(arch::_mm256_permute2f128_ps::<0x20>(z[0], z[1])),
+                ]),
+                Vector([
+                    Self(arch::_mm256_permute2f128_ps::<0x31>(x[0], x[1])),
+                    Self(arch::_mm256_permute2f128_ps::<0x31>(y[0], y[1])),
+                    Self(arch::_mm256_permute2f128_ps::<0x31>(z[0], z[1])),
+                ]),
+            ]
         }
     }
 }

@@ -2,6 +2,8 @@
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx512;
 
 use crate::Vec3;
 use std::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
@@ -61,6 +63,29 @@ pub(crate) trait Doubles: Lanes {
     /// the ends of the range, where that is no normal number, something smaller than 2⁻¹⁰⁰⁰ or larger than 2¹⁰⁰⁰.
     fn inverse_exponent(self) -> Self;
 }
+
+/// Both ends of a point's motion in single precision, with an entry of no meaning after each.
+pub(crate) type SmallRow = [f32; 8];
+
+/// [`Lanes`] in single precision, and how they come from memory.
+pub(crate) trait Singles: Lanes {
+    const COUNT: usize;
+    /// Entries of row `k` of the first lanes: the point at t0 and at t1.
+    fn gather(rows: &[[&SmallRow; 4]; MAX_SINGLES], k: usize) -> [Vector<Self>; 2];
+}
+
+impl Singles for f32 {
+    const COUNT: usize = 1;
+
+    #[inline(always)]
+    fn gather(rows: &[[&SmallRow; 4]; MAX_SINGLES], k: usize) -> [Vector<Self>; 2] {
+        let row = rows[0][k];
+        [Vector([row[0], row[1], row[2]]), Vector([row[4], row[5], row[6]])]
+    }
+}
+
+/// Lanes of the longest [`Singles`].
+pub(crate) const MAX_SINGLES: usize = 16;
 
 /// Lanes of the longest [`Doubles`].
 pub(crate) const MAX_DOUBLES: usize = 8;
