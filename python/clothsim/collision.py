@@ -14,7 +14,7 @@ from clothsim._device import check_threads
 
 __all__ = ["Detection", "detect", "edge_edge_ccd", "self_intersections", "vertex_triangle_ccd"]
 
-Method = Literal["brute", "bvh", "grid", "virtual-subdivision", "auto"]
+Method = Literal["brute", "bvh", "grid", "virtual-subdivision", "octree-single", "octree", "auto"]
 Mode = Literal["continuous", "discrete"]
 
 _logger = logging.getLogger(__name__)
@@ -38,7 +38,9 @@ class Detection:
         As above.
     stats : dict
         ``method`` and ``device`` that found them (``"cpu"``, or the GPU with its driver), counts
-        (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage.
+        (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage. The methods of a GPU also
+        count ``registrations`` of triangles in cells, the ``parts`` these come to (octrees: ``leaves``,
+        ``coarsest_level``, ``finest_level``), and the ``bytes`` on the device.
     """
 
     vertex_triangle: Ints
@@ -60,6 +62,8 @@ def detect(
     thickness: float = 0.0,
     device: str = "cpu",
     threads: int | None = None,
+    *,
+    cell_factor: float | None = None,
 ) -> Detection:
     """Find every vertex-triangle and edge-edge pair that shares no vertex and comes within ``thickness``.
 
@@ -72,9 +76,10 @@ def detect(
         Positions at both ends of the step [m].
     triangles : (m, 3) array of int32 or int64
         Vertex indices.
-    method : {"bvh", "brute", "grid", "virtual-subdivision", "auto"}
+    method : {"bvh", "brute", "grid", "virtual-subdivision", "octree-single", "octree", "auto"}
         On the CPU: ``"bvh"``, a tree of boxes; ``"brute"``, every pair, the oracle, for small meshes. On a GPU:
-        ``"grid"``, a uniform grid; ``"virtual-subdivision"``, a finer one in which large triangles count in parts.
+        ``"grid"``, a uniform grid; ``"virtual-subdivision"``, a finer one in which large triangles count in parts;
+        ``"octree-single"`` and ``"octree"``, adaptive octrees of one and two stages.
         ``"auto"``: ``"bvh"`` on the CPU, ``"virtual-subdivision"`` on a GPU.
     mode : {"continuous", "discrete"}
         The motion, or the end positions ``x_t1`` alone.
@@ -86,6 +91,9 @@ def detect(
         fails, ``"bvh"`` on the CPU, with the reason in the log (logger ``clothsim.collision``).
     threads : int, optional
         How many threads; all of the machine's by default.
+    cell_factor : float, optional
+        λ of ``"virtual-subdivision"`` (thesis Eq. 5.1), 0.1 to 100: cells are 3 λ times the average radius.
+        By default 1.2. The contacts do not depend on it.
 
     Returns
     -------
@@ -122,6 +130,7 @@ def detect(
         number(thickness, "thickness", _THICKNESS),
         str(device),
         check_threads(threads),
+        None if cell_factor is None else number(cell_factor, "cell_factor", "λ from 0.1 to 100"),
     )
     if fallback is not None:
         has_failed, reason = fallback

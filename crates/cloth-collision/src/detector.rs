@@ -9,6 +9,12 @@ pub trait Detector: Send {
     /// The method's name, as [`detector`] takes it.
     fn name(&self) -> &'static str;
 
+    /// Whether a query with few active vertices takes less than one of all. Where it does not, a caller that looks again at a few may
+    /// ask [`Bvh`] instead: the answer is the same.
+    fn narrows(&self) -> bool {
+        true
+    }
+
     /// All contacts of the query: unique, sorted, the same bits for any number of threads.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ mod bending;
 mod collision;
 mod convert;
 mod detach;
+mod device;
 mod errors;
 mod friction;
 mod mesh;
@@ -40,6 +41,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(collision::vertex_triangle_ccd, module)?)?;
     module.add_function(wrap_pyfunction!(collision::edge_edge_ccd, module)?)?;
     module.add_function(wrap_pyfunction!(collision::self_intersections, module)?)?;
+
+    module.add_function(wrap_pyfunction!(device::gpu_adapters, module)?)?;
+    module.add_function(wrap_pyfunction!(device::lose_gpu, module)?)?;
+    module.add_function(wrap_pyfunction!(device::let_auto_take_software, module)?)?;
 
     module.add_class::<scene::PyScene>()?;
     module.add_function(wrap_pyfunction!(scene::scene_schema, module)?)?;
