@@ -40,7 +40,7 @@ class Detection:
         ``method`` and ``device`` that found them (``"cpu"``, or the GPU with its driver), counts
         (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage. The methods of a GPU also
         count ``registrations`` of triangles in cells, the ``parts`` these come to (octrees: ``leaves``,
-        ``coarsest_level``, ``finest_level``), and the ``bytes`` on the device.
+        ``coarsest_level``, ``finest_level``, ``registrations_level_0`` to ``_10``), and the ``bytes`` on the device.
     """
 
     vertex_triangle: Ints

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
@@ -83,3 +84,10 @@ def ccd_data() -> Path:
             pytest.fail(f"no ground truth: set {VARIABLE}")
         pytest.skip(f"no ground truth: neither ${VARIABLE} nor ../shared/data is there")
     return folder / "ccd"
+
+
+def without_gpu(reason: object) -> NoReturn:
+    """Skip what needs an adapter and got none, or fail where there has to be one."""
+    if os.environ.get("CLOTHSIM_REQUIRE_GPU") == "1":
+        pytest.fail(f"CLOTHSIM_REQUIRE_GPU=1, but {reason}")
+    pytest.skip(str(reason))

@@ -2,7 +2,7 @@
 // coarser cell takes the one visit that holds the triangle's token there (thesis 6.3.1).
 //   in   ranges[t], offsets[t]  t < n: visits before each triangle, (low, high), and their number
 //   out  counts[node]           zero before
-// Includes: layout, octree, octree_find.   Twin: src/twin/octree.rs
+// Includes: layout, octree, octree_find.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> offsets: array<vec2<u32>>;

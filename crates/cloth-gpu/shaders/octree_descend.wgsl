@@ -1,7 +1,7 @@
 // The top-down stage (thesis 6.3.1): the coarsest cell that is not divided takes all that is below it.
 //   in   kinds[node]
 //   out  leaves[p]  level of the leaf that page p lies in; params.page: the page itself or cells below it
-// Includes: layout, octree.   Twin: src/twin/octree.rs
+// Includes: layout, octree.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> kinds: array<u32>;
 @group(0) @binding(2) var<storage, read_write> leaves: array<u32>;

@@ -3,7 +3,7 @@
 //        ranges[t], spheres[t]
 //   out  entries[r]
 //        tally[l]              registrations in leaves of level l, added; tally[TALLY_LEAVES]: leaves
-// Includes: layout, octree.   Twin: src/twin/octree.rs
+// Includes: layout, octree.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: LengthParams;
 @group(0) @binding(1) var<storage, read> lengths: array<u32>;
 @group(0) @binding(2) var<storage, read> keys: array<u32>;

@@ -2,7 +2,7 @@
 //   in   counts[node]; costs[node] of the children; params.level
 //   out  costs[node] tests of the best division of the cell (two-stage), or of the whole cell (single-stage)
 //        kinds[node] 1: divided
-// Includes: layout, octree.   Twin: src/twin/octree.rs
+// Includes: layout, octree.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> costs: array<vec2<u32>>;

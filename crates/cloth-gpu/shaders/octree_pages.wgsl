@@ -5,7 +5,7 @@
 //        selected[k]         pages with trees, k < selected_before[pages]
 //   out  costs[p]   tests of the page: of its best division (two-stage), or undivided (single-stage)
 //        types[3 p]  73 bits: cells that are divided further, of the page itself, its 8 children, their 64 children
-// Includes: layout, octree.   Twin: src/twin/octree.rs
+// Includes: layout, octree.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> counts: array<u32>;

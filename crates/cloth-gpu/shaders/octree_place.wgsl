@@ -3,7 +3,7 @@
 //        firsts[p]              members before page p
 //   out  members[m]             triangles, in any order within a page
 //        cursors[p]             zero before; then how many there are
-// Includes: layout, octree, octree_find.   Twin: src/twin/octree.rs
+// Includes: layout, octree, octree_find.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> offsets: array<vec2<u32>>;

@@ -3,7 +3,7 @@
 //   out  ranges[t]  lowest and highest cell, ten bits per axis
 //        counts[t]  pages
 // The place of a coordinate does not decrease with it: of two boxes that meet, so do the ranges, along each axis.
-// Includes: layout, octree.   Twin: src/twin/octree.rs
+// Includes: layout, octree.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> bounds: array<Bounds>;
 @group(0) @binding(2) var<storage, read_write> ranges: array<vec2<u32>>;

@@ -5,7 +5,7 @@
 //   out  counts[v]              registrations of visit v; 0 from the last visit up to params.room (no WRITE)
 //        keys[r]                2 · number of the leaf's lowest cell of the base level (WRITE)
 //        registered[r]          triangle | levels above the base << 28 (WRITE). What does not fit is left out.
-// Includes: layout, octree, octree_find.   Twin: src/twin/octree.rs
+// Includes: layout, octree, octree_find.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> ranges: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> offsets: array<vec2<u32>>;

@@ -2,7 +2,7 @@
 //   in   counts[p]
 //   out  flags[p], numbers[p]  1: has a tree; p
 //        costs[p], types[3 p]  of those that have none
-// Includes: layout, octree.   Twin: src/twin/octree
+// Includes: layout, octree.   Twin: src/twin/octree/mod.rs
 @group(0) @binding(0) var<uniform> params: OctreeParams;
 @group(0) @binding(1) var<storage, read> counts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> flags: array<u32>;

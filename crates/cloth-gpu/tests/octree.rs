@@ -357,7 +357,9 @@ fn the_twin_finds_each_pair_once_and_needs_its_token() {
         let pairs = |is_two_stage, levels, has_token| {
             let twin = OctreeTwin { is_two_stage, levels, has_token };
             let mut pairs = twin.pairs(&mesh, &query, &frame).0;
-            pairs.iter_mut().for_each(|p| p.sort_unstable());
+            for pair in &mut pairs {
+                pair.sort_unstable();
+            }
             pairs.sort_unstable();
             pairs
         };

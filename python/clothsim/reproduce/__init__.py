@@ -6,6 +6,8 @@
 | `contract` | what the module of a figure offers, and what it is given |
 | `job` | one figure from measurement to files |
 | `kes` | the thesis's units, its fabrics |
+| `benchmarks` | the scenes of chapters 5 and 6: data, and meshes in motion (`moving`) made by `knots` and `pushed` |
+| `counting`, `timings` | what detection on a GPU takes on them |
 | `pictures` | one style for plots and rendered tiles |
 | `figure_…`, `table_…` | one figure or table each |
 

@@ -291,8 +291,8 @@ mod tests {
             assert_eq!(two, least(&params, &counts, 0, [0; 3]));
             assert!(two <= single, "{two}, {single}");
             gained += usize::from(two < single);
-            // A count that is off: cells as if every triangle met half of the others only once.
-            wrong += usize::from(cost(1, |n| u64::from(n)) > two);
+            // Divided by the number of triangles instead of pairs.
+            wrong += usize::from(cost(1, u64::from) > two);
         }
         assert!(gained > 1, "some scene must show the difference");
         assert!(wrong > 1, "a wrong cost must show");
