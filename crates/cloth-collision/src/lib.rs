@@ -31,6 +31,7 @@ mod detector;
 mod error;
 mod intersect;
 mod narrow;
+mod session;
 mod stencil;
 
 pub use brute::BruteForce;
@@ -42,6 +43,9 @@ pub use detector::{Detector, detector};
 pub use error::DetectError;
 pub use intersect::{intersections, self_intersections};
 pub use narrow::NarrowPhase;
+pub use session::{
+    Adapt, FrameKind, Frames, MOST_FRAMES, SessionOptions, SessionStats, SkippingSession, Variant,
+};
 pub use stencil::{Stencil, StencilKind, stencil_at_contact_edge_edge, stencil_at_contact_vertex_triangle};
 
 /// A point [m] in space.
