@@ -68,12 +68,12 @@ fn measure(name: &str, sequence: &Sequence, frames: u32, thickness: f64, threads
         ("SwD", SessionOptions::default()),
         ("SwD curved", SessionOptions { low_curvature: false, ..SessionOptions::default() }),
     ];
-    let x = sequence.at(0);
+    let x = sequence.rest.clone();
     let mesh = &sequence.mesh;
     let mut sessions: Vec<SkippingSession> =
         rows.iter().map(|r| SkippingSession::new(mesh, &x, r.1).unwrap()).collect();
     let mut sums: Vec<Sum> = rows.iter().map(|_| Sum::default()).collect();
-    let mut x_t0 = x;
+    let mut x_t0 = sequence.at(0);
     for frame in 0..frames {
         let x_t1 = sequence.at(frame + 1);
         let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode: Mode::Continuous, active: None };

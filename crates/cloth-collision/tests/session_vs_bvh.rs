@@ -52,6 +52,7 @@ struct Seen {
     dangling: u64,
     one_by_one: usize,
     all_at_once: usize,
+    flat: u64,
 }
 
 impl Seen {
@@ -63,6 +64,7 @@ impl Seen {
             FrameKind::Skipping => self.skipping += 1,
         }
         self.dangling += stats.dangling_triangles;
+        self.flat += stats.flat_triangles;
         if stats.dangling_vertices > 0 {
             self.one_by_one += usize::from(stats.one_by_one);
             self.all_at_once += usize::from(!stats.one_by_one);
@@ -72,10 +74,21 @@ impl Seen {
 
 /// Every variant against the oracle over a sequence of (x_t0, x_t1).
 fn compare(mesh: &CollisionMesh, frames: &[[Vec<Vec3>; 2]], small: bool, what: &str) -> Seen {
+    compare_from(mesh, &frames[0][0], frames, small, what)
+}
+
+/// [`compare`] with trees in the shape of `x`.
+fn compare_from(
+    mesh: &CollisionMesh,
+    x: &[Vec3],
+    frames: &[[Vec<Vec3>; 2]],
+    small: bool,
+    what: &str,
+) -> Seen {
     let (one, two) = (pool(1), pool(2));
     let mut seen = Seen::default();
     for (thickness, mode) in [(0.0, Mode::Continuous), (0.02, Mode::Continuous), (0.02, Mode::Discrete)] {
-        let mut bvh = Bvh::new(mesh, &frames[0][0]).unwrap();
+        let mut bvh = Bvh::new(mesh, x).unwrap();
         let expected: Vec<Contacts> = frames
             .iter()
             .map(|[x_t0, x_t1]| {
@@ -88,7 +101,7 @@ fn compare(mesh: &CollisionMesh, frames: &[[Vec<Vec3>; 2]], small: bool, what: &
             })
             .collect();
         for options in variants() {
-            let mut session = SkippingSession::new(mesh, &frames[0][0], options).unwrap();
+            let mut session = SkippingSession::new(mesh, x, options).unwrap();
             for (k, [x_t0, x_t1]) in frames.iter().enumerate() {
                 let query = Query { x_t0, x_t1, thickness, mode, active: None };
                 let got = session.detect(mesh, &query, if k % 2 == 0 { &one } else { &two }).unwrap();
@@ -151,6 +164,31 @@ fn coherent_motion_agrees_with_the_tree() {
     let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
     let seen = compare(&mesh, &along(16, waves(&x, 0.0005)), false, "waves");
     assert!(seen.contacts > 10_000 && seen.skipping > 200, "{seen:?}");
+}
+
+/// A sheet whose right half turns over onto the left one, with waves.
+fn folding(x: &[Vec3], k: usize, speed: f64) -> Vec<Vec3> {
+    let angle = (3.06 + speed * k as f64).min(3.13);
+    let fold = |p: &Vec3| {
+        let (wave, side) =
+            (0.01 * (20.0 * p.x + 2.0 * k as f64 * speed).sin() * (15.0 * p.z).cos(), p.x - 0.5);
+        if side < 0.0 {
+            Vec3::new(-side, wave, p.z)
+        } else {
+            Vec3::new(-side * angle.cos(), side * angle.sin() - wave * angle.cos(), p.z)
+        }
+    };
+    x.iter().map(fold).collect()
+}
+
+#[test]
+fn folding_cloth_agrees_with_its_flat_parts_left_out() {
+    for (seed, n, small) in [(21, 26, true), (22, 40, false)] {
+        let (x, triangles) = sheet(n, &mut Random(seed));
+        let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
+        let seen = compare_from(&mesh, &x, &along(7, |k| folding(&x, k, 0.005)), small, "folding");
+        assert!(seen.flat > 5_000 && seen.contacts > 100, "{seen:?}");
+    }
 }
 
 #[test]

@@ -8,14 +8,19 @@
 //! where that happened ([`dangling`]), which registers its pairs anew. So the list is complete for the balls at all times,
 //! whatever the motion, and the contacts are those of [`crate::Bvh`], bit for bit.
 //!
+//! A block of the tree that certainly does not meet itself ([`flat`]) is not traversed against itself.
+//!
 //! Nothing of a session is part of an answer: a session that starts in any frame finds the same contacts.
 //!
 //! Source: \[wong2010\].
 
 mod adapt;
+mod contour;
 mod dangling;
 mod distance;
 mod every_frame;
+mod flat;
+mod frame;
 mod options;
 mod pairs;
 mod room;
@@ -28,6 +33,7 @@ use crate::bvh::refit::Boxes;
 use crate::bvh::traverse::{Candidates, Sink, Streaming, TraverseCounts, traverse};
 use crate::{Body, Bvh, CollisionMesh, Contacts, DetectError, Detector, Query, Vec3};
 use adapt::{Adaptation, Plan};
+use contour::Contours;
 use dangling::{Upwards, ball_box, one_by_one, one_by_one_tests};
 use pairs::{FrontEnd, Pairs, Register};
 use room::{Reach, Room, Weights};
@@ -54,6 +60,7 @@ pub struct SkippingSession {
     running: Option<Running>,
     boxes: Boxes<1>,
     upwards: Option<Upwards>,
+    contours: Option<Contours>,
     reach: Reach,
     /// Tests per dangling leaf when last met one by one, and all at once.
     tests_per_leaf: [Option<f64>; 2],
@@ -88,6 +95,7 @@ impl SkippingSession {
             running: None,
             boxes: Boxes::default(),
             upwards: None,
+            contours: None,
             reach: Reach::default(),
             tests_per_leaf: [None; 2],
             stats: SessionStats::default(),
@@ -166,6 +174,15 @@ impl SkippingSession {
         let of_vertex = |v: usize| ball_box(&room.middles[v], room.radii[v], room.thickness);
         self.boxes.refit(tree, mesh, of_vertex, None, pool);
         work.updated(mesh.vertex_count, tree.block_count());
+        if self.options.low_curvature {
+            let contours = self.contours.get_or_insert_with(|| Contours::new(tree, mesh));
+            let is_simple =
+                |loops: &[Vec<u32>], axis: &Vec3, position: &(dyn Fn(u32) -> Vec3 + Sync), clearance| {
+                    contour::is_simple(loops, axis, position, clearance)
+                };
+            let flat = flat::mark(&mut self.boxes, tree, mesh, &room, contours, is_simple, pool);
+            (self.stats.flat_surfaces, self.stats.flat_triangles) = (flat.surfaces, flat.triangles);
+        }
         let updated = Instant::now();
         let register =
             || Streaming::new(Register::new(mesh, &room.middles, &room.radii, None, room.thickness));
@@ -289,7 +306,7 @@ impl SkippingSession {
         let mut is_same_frame = false;
         let start = Instant::now();
         if let Some(session) = &mut running {
-            session.room.reach(mesh, query, &mut self.reach, pool);
+            session.room.reach(mesh, query, false, &mut self.reach, pool);
             is_same_frame = self.reach.signature == session.signature;
             self.stats.update_seconds += start.elapsed().as_secs_f64();
             if !is_same_frame && session.frames_left == 0
@@ -313,12 +330,12 @@ impl SkippingSession {
                 let weights = Weights { alpha, beta, gamma };
                 running = self.start(mesh, query, (frames, weights), &mut work, pool);
             }
-            let Some(session) = &running else {
+            let Some(session) = &mut running else {
                 self.stats.kind = FrameKind::Alone;
                 return self.alone(mesh, query, is_planned, pool);
             };
             let start = Instant::now();
-            session.room.reach(mesh, query, &mut self.reach, pool);
+            session.room.reach(mesh, query, true, &mut self.reach, pool);
             self.stats.update_seconds += start.elapsed().as_secs_f64();
             self.stats.kind = FrameKind::First;
         }
