@@ -1,7 +1,7 @@
 //! The scene's collision topology: all bodies in one vertex array, features, their owners and the rules for pairs.
 
 use crate::DetectError;
-use cloth_mesh::{NONE, Topology};
+use cloth_mesh::{NONE, Topology, VertexTriangles};
 
 /// What a body is to contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub struct CollisionMesh {
     pub vertex_owner: Vec<u32>,
     /// R-triangle assignment: the triangle that tests each edge for all.
     pub edge_owner: Vec<u32>,
+    /// The triangles at each vertex.
+    pub vertex_triangles: VertexTriangles,
     has_attachments: bool,
 }
 
@@ -101,6 +103,7 @@ impl CollisionMesh {
             attached_to: vec![NONE; vertex_count],
             vertex_owner: vec![],
             edge_owner: vec![],
+            vertex_triangles: VertexTriangles::default(),
             has_attachments: false,
         };
         if with_features {
@@ -110,7 +113,8 @@ impl CollisionMesh {
     }
 
     fn find_features(&mut self) {
-        let Topology { edges, triangle_edges, .. } = Topology::new(self.vertex_count, &self.triangles);
+        let Topology { edges, triangle_edges, vertex_triangles, .. } =
+            Topology::new(self.vertex_count, &self.triangles);
         self.vertex_owner = vec![NONE; self.vertex_count];
         self.edge_owner = vec![NONE; edges.len()];
         for t in (0..self.triangles.len()).rev() {
@@ -119,7 +123,7 @@ impl CollisionMesh {
                 self.edge_owner[triangle_edges[t][k] as usize] = t as u32;
             }
         }
-        (self.edges, self.triangle_edges) = (edges, triangle_edges);
+        (self.edges, self.triangle_edges, self.vertex_triangles) = (edges, triangle_edges, vertex_triangles);
     }
 
     /// Declares that `vertex` is held by `body`: features with this vertex are not tested against that body.

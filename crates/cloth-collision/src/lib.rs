@@ -31,6 +31,7 @@ mod detector;
 mod error;
 mod intersect;
 mod narrow;
+mod nearest;
 mod session;
 mod stencil;
 
@@ -43,6 +44,7 @@ pub use detector::{Detector, detector};
 pub use error::DetectError;
 pub use intersect::{intersections, self_intersections};
 pub use narrow::NarrowPhase;
+pub use nearest::Nearest;
 pub use session::{
     Adapt, FrameKind, Frames, MOST_FRAMES, SessionOptions, SessionStats, SkippingSession, Variant,
 };

@@ -10,11 +10,13 @@ mod error;
 mod rest_shape;
 mod topology;
 mod trimesh;
+mod vertex_triangles;
 
 pub use error::MeshError;
 pub use rest_shape::RestShape;
 pub use topology::{Hinge, Topology};
 pub use trimesh::TriMesh;
+pub use vertex_triangles::VertexTriangles;
 
 /// A point [m], velocity [m/s] or force [N] in space.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -1,6 +1,6 @@
 //! What follows from the triangles alone: edges, hinges, adjacency, boundary.
 
-use crate::{MeshError, NONE};
+use crate::{MeshError, NONE, VertexTriangles};
 
 /// How many triangles an error about an edge lists.
 const MAX_NAMED_TRIANGLES: usize = 8;
@@ -34,8 +34,8 @@ pub struct Topology {
     pub boundary_edges: Vec<u32>,
     /// Edges with more than two triangles, in edge order, with the number of triangles.
     pub non_manifold_edges: Vec<(u32, u32)>,
-    vertex_triangle_offsets: Vec<u32>,
-    vertex_triangle_list: Vec<u32>,
+    /// The triangles at each vertex.
+    pub vertex_triangles: VertexTriangles,
 }
 
 impl Topology {
@@ -75,31 +75,13 @@ impl Topology {
             }
         }
 
-        let mut offsets = vec![0u32; vertex_count + 1];
-        for &v in triangles.iter().flatten() {
-            offsets[v as usize + 1] += 1;
-        }
-        for v in 0..vertex_count {
-            offsets[v + 1] += offsets[v];
-        }
-        let mut next = offsets.clone();
-        let mut list = vec![0u32; 3 * triangles.len()];
-        for (t, tri) in triangles.iter().enumerate() {
-            for &v in tri {
-                list[next[v as usize] as usize] = t as u32;
-                next[v as usize] += 1;
-            }
-        }
-        topology.vertex_triangle_offsets = offsets;
-        topology.vertex_triangle_list = list;
+        topology.vertex_triangles = VertexTriangles::new(vertex_count, triangles);
         topology
     }
 
     /// Triangles that use `vertex`, ascending.
     pub fn vertex_triangles(&self, vertex: u32) -> &[u32] {
-        let v = vertex as usize;
-        let (lo, hi) = (self.vertex_triangle_offsets[v], self.vertex_triangle_offsets[v + 1]);
-        &self.vertex_triangle_list[lo as usize..hi as usize]
+        self.vertex_triangles.of(vertex)
     }
 
     /// Whether every edge has exactly two triangles, i.e. the surface has no boundary.

@@ -7,170 +7,84 @@
 //! come to the same triangle are one contact.
 
 use crate::Vec3;
-use crate::motion::bytes_of;
-use cloth_collision::distance::{edge_edge, vertex_triangle};
-use cloth_collision::{CollisionMesh, Stencil, StencilKind};
+use cloth_collision::distance::edge_edge;
+use cloth_collision::{CollisionMesh, Nearest, Stencil, StencilKind};
 
 /// Least cosine between the normals at the start and at the candidate end of one contact.
 const LEAST_AGREEMENT: f64 = 0.5;
-/// A triangle is nearer than another by at least this fraction of the squared distance: above its rounding error, so that
-/// no pair goes back and forth between triangles that share the closest point.
-const NEARER: f64 = 1e-9;
-/// A point with a weight below this lies on the side opposite: it is found on it from the triangle there too, and rounding
-/// must not make two contacts of it.
-const ON_SIDE: f64 = 1e-9;
-/// Triangles that a pair may cross in one step; a pair that crosses more is left to the continuous detection.
-const MAX_CROSSED: usize = 64;
-
-/// The triangles at each vertex, by which pairs are followed.
-#[derive(Debug, Default)]
-pub struct Landing {
-    /// Where the list of each vertex begins in `triangles`.
-    first: Vec<u32>,
-    triangles: Vec<u32>,
-}
 
 /// A near pair at the start, and at the candidate end where it is the same contact there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Landed {
+pub(crate) struct Landed {
     /// The pair at `x_t0`.
-    pub start: Stencil,
+    pub(crate) start: Stencil,
     /// Closest points, normal and gap at `x_t1`; the gap (`distance`) is negative where the vertex has gone through. `None`
     /// if the pair turns by more than 60° or two edges no longer cross.
-    pub end: Option<Stencil>,
+    pub(crate) end: Option<Stencil>,
 }
 
-impl Landing {
-    /// For the surfaces of `mesh`.
-    pub fn new(mesh: &CollisionMesh) -> Self {
-        let mut first = vec![0; mesh.vertex_count + 1];
-        for v in mesh.triangles.iter().flatten() {
-            first[*v as usize + 1] += 1;
-        }
-        for v in 0..mesh.vertex_count {
-            first[v + 1] += first[v];
-        }
-        let mut next = first.clone();
-        let mut triangles = vec![0; 3 * mesh.triangles.len()];
-        for (t, triangle) in mesh.triangles.iter().enumerate() {
-            for v in triangle {
-                triangles[next[*v as usize] as usize] = t as u32;
-                next[*v as usize] += 1;
-            }
-        }
-        Self { first, triangles }
-    }
-
-    /// Memory [B].
-    pub fn bytes(&self) -> usize {
-        bytes_of(&self.first) + bytes_of(&self.triangles)
-    }
-
-    /// Where the near pairs of the start are at the positions `x_t1` \[m\].
-    ///
-    /// `near`: as [`cloth_collision::Bvh::proximity`] sorts it. Of the pairs of one vertex that come to the same triangle
-    /// `take` sees the nearest at the start.
-    pub fn follow(
-        &self,
-        near: &[Stencil],
-        mesh: &CollisionMesh,
-        x_t1: &[Vec3],
-        mut take: impl FnMut(Landed),
-    ) {
-        let one_vertex = |a: &Stencil, b: &Stencil| {
-            a.kind == StencilKind::VertexTriangle && b.kind == a.kind && a.vertices[0] == b.vertices[0]
-        };
-        let mut landed: Vec<Landed> = Vec::new();
-        for pairs in near.chunk_by(one_vertex) {
-            landed.clear();
-            for &start in pairs {
-                let end = self.end(&start, mesh, x_t1);
-                let same = |other: &&mut Landed| {
-                    end.is_some() && other.end.map(|o| o.vertices) == end.map(|e| e.vertices)
-                };
-                match landed.iter_mut().find(same) {
-                    Some(other) if start.distance < other.start.distance => *other = Landed { start, end },
-                    Some(_) => {}
-                    None => landed.push(Landed { start, end }),
-                }
-            }
-            for &pair in &landed {
-                take(pair);
-            }
-        }
-    }
-
-    /// The pair at the positions `x_t1`, see [`Landed::end`].
-    fn end(&self, start: &Stencil, mesh: &CollisionMesh, x_t1: &[Vec3]) -> Option<Stencil> {
-        let (vertices, weights) = match start.kind {
-            StencilKind::VertexTriangle => self.nearest_around(start.vertices, mesh, x_t1),
-            StencilKind::EdgeEdge => {
-                let (s, t) = edge_edge::closest_points(&start.vertices.map(|v| x_t1[v as usize]));
-                if s <= 0.0 || s >= 1.0 || t <= 0.0 || t >= 1.0 {
-                    return None;
-                }
-                (start.vertices, [1.0 - s, s, t - 1.0, -t])
-            }
-        };
-        let p = vertices.map(|v| x_t1[v as usize]);
-        let r = separation(&p, &weights);
-        let inside = start.kind == StencilKind::VertexTriangle && weights[1..].iter().all(|w| *w != 0.0);
-        let direction = if inside { (p[2] - p[1]).cross(&(p[3] - p[1])) } else { r };
-        let unit = direction.try_normalize(0.0)?;
-        // The plane of a triangle has two sides: the one on which the pair started.
-        let normal = if inside && start.normal.dot(&unit) < 0.0 { -unit } else { unit };
-        (start.normal.dot(&normal) > LEAST_AGREEMENT).then(|| Stencil {
-            kind: start.kind,
-            vertices,
-            weights,
-            normal,
-            distance: normal.dot(&r),
-        })
-    }
-
-    /// The triangle nearest to the vertex among those that are reached from the given one over the closest sides and
-    /// corners, each step nearer than the one before.
-    fn nearest_around(&self, start: [u32; 4], mesh: &CollisionMesh, x: &[Vec3]) -> ([u32; 4], [f64; 4]) {
-        let (mut best, mut weights, mut distance2) = closest(start, x);
-        for _ in 0..MAX_CROSSED {
-            let Some(corner) = (1..4).find(|&k| weights[k] != 0.0).filter(|_| weights[1..].contains(&0.0))
-            else {
-                break;
+/// Where the near pairs of the start are at the positions `x_t1` \[m\].
+///
+/// `near`: as [`cloth_collision::Bvh::proximity`] sorts it. Of the pairs of one vertex that come to the same triangle
+/// `take` sees the nearest at the start.
+pub(crate) fn follow(near: &[Stencil], mesh: &CollisionMesh, x_t1: &[Vec3], mut take: impl FnMut(Landed)) {
+    let one_vertex = |a: &Stencil, b: &Stencil| {
+        a.kind == StencilKind::VertexTriangle && b.kind == a.kind && a.vertices[0] == b.vertices[0]
+    };
+    let mut landed: Vec<Landed> = Vec::new();
+    for pairs in near.chunk_by(one_vertex) {
+        landed.clear();
+        for &start in pairs {
+            let end = end_of(&start, mesh, x_t1);
+            let same = |other: &&mut Landed| {
+                end.is_some() && other.end.map(|o| o.vertices) == end.map(|e| e.vertices)
             };
-            let (from, at) = (best, weights);
-            let list =
-                self.first[from[corner] as usize] as usize..self.first[from[corner] as usize + 1] as usize;
-            let mut crossed = false;
-            for &t in &self.triangles[list] {
-                let triangle = mesh.triangles[t as usize];
-                let shares = (1..4).all(|k| at[k] == 0.0 || triangle.contains(&from[k]));
-                if !shares || triangle == from[1..] || triangle.contains(&start[0]) {
-                    continue;
-                }
-                let found = closest([start[0], triangle[0], triangle[1], triangle[2]], x);
-                if found.2 < distance2 * (1.0 - NEARER) {
-                    (best, weights, distance2) = found;
-                    crossed = true;
-                }
-            }
-            if !crossed {
-                break;
+            match landed.iter_mut().find(same) {
+                Some(other) if start.distance < other.start.distance => *other = Landed { start, end },
+                Some(_) => {}
+                None => landed.push(Landed { start, end }),
             }
         }
-        (best, weights)
+        for &pair in &landed {
+            take(pair);
+        }
     }
 }
 
-/// The pair, the weights of its closest points and their squared distance.
-fn closest(vertices: [u32; 4], x: &[Vec3]) -> ([u32; 4], [f64; 4], f64) {
-    let p = vertices.map(|v| x[v as usize]);
-    let mut w = vertex_triangle::closest_point(&p).map(|w| if w < ON_SIDE { 0.0 } else { w });
-    let sum: f64 = w.iter().sum();
-    for w in &mut w {
-        *w /= sum;
-    }
-    let weights = [1.0, -w[0], -w[1], -w[2]];
-    (vertices, weights, separation(&p, &weights).norm_squared())
+/// The pair at the positions `x_t1`, see [`Landed::end`].
+fn end_of(start: &Stencil, mesh: &CollisionMesh, x_t1: &[Vec3]) -> Option<Stencil> {
+    let (vertices, weights) = match start.kind {
+        StencilKind::VertexTriangle => nearest(start.vertices, mesh, x_t1)?,
+        StencilKind::EdgeEdge => {
+            let (s, t) = edge_edge::closest_points(&start.vertices.map(|v| x_t1[v as usize]));
+            if s <= 0.0 || s >= 1.0 || t <= 0.0 || t >= 1.0 {
+                return None;
+            }
+            (start.vertices, [1.0 - s, s, t - 1.0, -t])
+        }
+    };
+    let p = vertices.map(|v| x_t1[v as usize]);
+    let r = separation(&p, &weights);
+    let inside = start.kind == StencilKind::VertexTriangle && weights[1..].iter().all(|w| *w != 0.0);
+    let direction = if inside { (p[2] - p[1]).cross(&(p[3] - p[1])) } else { r };
+    let unit = direction.try_normalize(0.0)?;
+    // The plane of a triangle has two sides: the one on which the pair started.
+    let normal = if inside && start.normal.dot(&unit) < 0.0 { -unit } else { unit };
+    (start.normal.dot(&normal) > LEAST_AGREEMENT).then(|| Stencil {
+        kind: start.kind,
+        vertices,
+        weights,
+        normal,
+        distance: normal.dot(&r),
+    })
+}
+
+/// The vertex with the nearest triangle of the surface around, and the weights of the closest points.
+fn nearest([v, a, b, c]: [u32; 4], mesh: &CollisionMesh, x: &[Vec3]) -> Option<([u32; 4], [f64; 4])> {
+    let start = mesh.triangle_of([a, b, c])?;
+    let Nearest { triangle, weights: w, .. } = mesh.nearest(start, &x[v as usize], |k| x[k as usize], v);
+    let [a, b, c] = mesh.triangles[triangle as usize];
+    Some(([v, a, b, c], [1.0, -w[0], -w[1], -w[2]]))
 }
 
 /// Vector from the second point to the first, from differences so that a far origin costs no digits.
@@ -182,6 +96,7 @@ fn separation(p: &[Vec3; 4], weights: &[f64; 4]) -> Vec3 {
 mod tests {
     use super::*;
     use cloth_collision::Body;
+    use cloth_collision::distance::vertex_triangle;
     use cloth_collision::mesh::generators::grid;
 
     /// A point of its own body over a level sheet of n × n points, cells 1 m, bent down by `fall` \[m/m\] for x > 0.
@@ -191,6 +106,14 @@ mod tests {
     }
 
     const POINTS: usize = 9;
+
+    /// The pair, the weights of its closest points and their squared distance.
+    fn at(vertices: [u32; 4], x: &[Vec3]) -> ([u32; 4], [f64; 4], f64) {
+        let p = vertices.map(|v| x[v as usize]);
+        let [a, b, c] = vertex_triangle::closest_point(&p);
+        let weights = [1.0, -a, -b, -c];
+        (vertices, weights, separation(&p, &weights).norm_squared())
+    }
 
     impl Ground {
         fn new(fall: f64) -> Self {
@@ -214,7 +137,7 @@ mod tests {
         /// The stencils of the point with all triangles within `band` of it, sorted as by the hierarchy.
         fn near(&self, p: Vec3, band: f64) -> Vec<Stencil> {
             let x = self.with_point(p);
-            let all = self.mesh.triangles.iter().map(|&[a, b, c]| closest([0, a, b, c], &x));
+            let all = self.mesh.triangles.iter().map(|&[a, b, c]| at([0, a, b, c], &x));
             let near = all.filter(|f| f.2 <= band * band).map(|(vertices, weights, d2)| {
                 let r = separation(&vertices.map(|v| x[v as usize]), &weights);
                 let kind = StencilKind::VertexTriangle;
@@ -226,7 +149,7 @@ mod tests {
         fn land(&self, from: Vec3, to: Vec3, band: f64) -> Vec<Landed> {
             let mut landed = vec![];
             let x = self.with_point(to);
-            Landing::new(&self.mesh).follow(&self.near(from, band), &self.mesh, &x, |l| landed.push(l));
+            follow(&self.near(from, band), &self.mesh, &x, |l| landed.push(l));
             // Closest points on one side or corner are taken once, as the contacts of a step are.
             let feature = |l: &Landed| {
                 let end = l.end?;
@@ -269,7 +192,7 @@ mod tests {
         let (from, to) = (Vec3::new(0.3, 0.1, 0.2), Vec3::new(1.1, 0.1, 0.2));
         let start = ground.near(from, 0.1001)[0];
         let x = ground.with_point(to);
-        let (_, weights, _) = closest(start.vertices, &x);
+        let (_, weights, _) = at(start.vertices, &x);
         let r = separation(&start.vertices.map(|v| x[v as usize]), &weights);
         assert!(weights.contains(&0.0) && r.normalize().x > 0.5, "{r:?}");
         assert_eq!(ground.land(from, to, 0.1001)[0].end.unwrap().normal, Vec3::y());

@@ -27,7 +27,6 @@ pub use error::ResponseError;
 pub use friction::law::FrictionLaw;
 pub use friction::rule::FrictionRule;
 pub use info::ResponseInfo;
-pub use landing::{Landed, Landing};
 pub use params::ResponseParams;
 pub use respond::Responder;
 pub use strain::{LimitedEdge, StrainLimit};

@@ -4,14 +4,14 @@ use crate::collisions::{APPROACH, Detection, Hit, look_again, unresolved};
 use crate::frames::Frames;
 use crate::friction::kernel::Kernel;
 use crate::hold::hold_back;
-use crate::landing::Landing;
+use crate::landing::follow;
 use crate::motion::{Motion, bytes_of};
 use crate::repulsion::{self, BAND};
 use crate::strain::limiter::Limiter;
 use crate::sweeps::ContactSet;
 use crate::zones::{Zones, move_zones};
 use crate::{ResponseError, ResponseInfo, ResponseParams, Vec3};
-use cloth_collision::{CollisionMesh, StencilKind};
+use cloth_collision::StencilKind;
 use std::collections::HashSet;
 use std::time::Instant;
 
@@ -26,7 +26,6 @@ pub(crate) struct Stages {
     /// Undeformed positions, or empty.
     pub(crate) rest_x: Vec<Vec3>,
     pub(crate) limiter: Limiter,
-    landing: Landing,
     frames: Frames,
     zones: Zones,
     hits: Vec<Hit>,
@@ -35,17 +34,12 @@ pub(crate) struct Stages {
 }
 
 impl Stages {
-    pub(crate) fn new(mesh: &CollisionMesh) -> Self {
-        Self { landing: Landing::new(mesh), ..Self::default() }
-    }
-
     /// Memory [B].
     pub(crate) fn bytes(&self) -> usize {
         // A hash set's slots: one byte of control each.
         let slots = self.shared.capacity() * (size_of::<[u32; 4]>() + 1);
         bytes_of(&self.rest_x)
             + self.limiter.bytes()
-            + self.landing.bytes()
             + self.frames.bytes()
             + self.zones.bytes()
             + bytes_of(&self.hits)
@@ -60,7 +54,7 @@ impl Stages {
         detection: &mut Detection<'_>,
         motion: &mut Motion<'_>,
     ) -> Result<ResponseInfo, ResponseError> {
-        let Self { rest_x, limiter, landing, frames, zones, hits, shared } = self;
+        let Self { rest_x, limiter, frames, zones, hits, shared } = self;
         let (mesh, x_t0) = (detection.mesh, motion.x_t0);
         let mut info = ResponseInfo::default();
         let mut clock = Clock(Instant::now());
@@ -74,7 +68,7 @@ impl Stages {
         info.proximities = near.len();
         clock.lap(&mut info, "proximity");
         shared.clear();
-        landing.follow(&near, mesh, &motion.buffers.end, |pair| {
+        follow(&near, mesh, &motion.buffers.end, |pair| {
             if let Some(contact) = repulsion::contact(&pair, mesh, params, rest_x, motion, &contacts.kernel)
                 && contact.shared_feature().is_none_or(|key| shared.insert(key))
             {

@@ -90,7 +90,9 @@ impl Room {
         let is_following = steps.is_less_following;
         let following = if is_following { following } else { Following::none() };
         let edge = mean_edge(mesh, x_t1);
-        let slack_of = |mean: f64| if mean > 0.0 { weights.beta * mean + weights.gamma * edge } else { 0.0 };
+        // What does not move at all needs no room; a frame that is followed comes with its rounding.
+        let moves = |mean: f64| is_following || mean > 0.0;
+        let slack_of = |mean: f64| if moves(mean) { weights.beta * mean + weights.gamma * edge } else { 0.0 };
         let slack: Vec<f64> = steps.mean.iter().map(|&mean| slack_of(mean)).collect();
         // Mean over the dynamic vertices of ½(1+α) v Δt + slack ≤ most.
         let weigh = |of_body: &dyn Fn(usize) -> f64| {

@@ -1,9 +1,9 @@
 //! One contact of a cloth vertex with a collider: the plane that it must not pass.
 
-use super::surface::Nearest;
 use super::{BAND, ConstraintStage};
 use crate::Vec3;
-use cloth_collision::CollisionMesh;
+use cloth_collision::mesh::NONE;
+use cloth_collision::{CollisionMesh, Nearest};
 use cloth_response::FrictionLaw;
 use nalgebra::Matrix3;
 
@@ -42,7 +42,8 @@ impl Motion<'_> {
     }
 
     fn nearest(&self, end: usize, triangle: u32, p: &Vec3) -> Nearest {
-        self.stage.surface.nearest(self.mesh, self.colliders[end], triangle, p)
+        let base = self.cloth.len();
+        self.mesh.nearest(triangle, p, |v| self.colliders[end][v as usize - base], NONE)
     }
 }
 

@@ -12,7 +12,6 @@ mod contact;
 mod friction;
 mod sites;
 mod step;
-mod surface;
 
 use crate::Vec3;
 use crate::bodies::Bodies;
@@ -21,7 +20,6 @@ use cloth_response::FrictionRule;
 
 pub(crate) use sites::{Holds, Settings, Sites};
 pub(crate) use step::failure;
-use surface::Surface;
 
 /// Pairs up to this multiple of the thickness may come to touch within the step, whatever their velocity.
 const BAND: f64 = 1.25;
@@ -32,7 +30,6 @@ const FARTHEST: f64 = 5.0;
 pub(crate) struct ConstraintStage {
     thickness: f64,
     friction: FrictionRule,
-    surface: Surface,
     /// Area of cloth at each cloth vertex [m²].
     areas: Vec<f64>,
     /// Vertices of colliders: pairs without one are not looked up.
@@ -50,12 +47,12 @@ impl ConstraintStage {
             }
         }
         let active = (0..mesh.vertex_count).map(|v| v >= areas.len()).collect();
-        Self { thickness, friction, surface: Surface::new(mesh, areas.len()), areas, active }
+        Self { thickness, friction, areas, active }
     }
 
     /// Memory [B].
     pub(crate) fn bytes(&self) -> usize {
-        self.surface.bytes() + 8 * self.areas.len() + self.active.len()
+        8 * self.areas.len() + self.active.len()
     }
 
     /// (vertex, triangle) of the cloth vertices near a collider at `x` [m], ascending; `way`: the farthest that two vertices
@@ -79,7 +76,7 @@ impl ConstraintStage {
             .filter(|s| self.active[s.vertices[1] as usize])
             .filter_map(|s| {
                 let [v, a, b, c] = s.vertices;
-                self.surface.triangle(mesh, [a, b, c]).map(|t| [v, t])
+                mesh.triangle_of([a, b, c]).map(|t| [v, t])
             })
             .collect();
         list.sort_unstable();
