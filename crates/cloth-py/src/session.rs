@@ -105,14 +105,13 @@ impl PySkippingSession {
         let work = || {
             let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let State { options, triangles, bodies, rest, pool, built } = &mut *state;
-            let Built { mesh, session } = match built {
-                Some(built) => built,
-                None => {
-                    let mesh = mesh_of(triangles, bodies.as_deref(), x_t0.len())?;
-                    let x = rest.as_deref().unwrap_or(&x_t0);
-                    let session = SkippingSession::new(&mesh, x, *options)?;
-                    built.insert(Built { mesh, session })
-                }
+            let Built { mesh, session } = if let Some(built) = built {
+                built
+            } else {
+                let mesh = mesh_of(triangles, bodies.as_deref(), x_t0.len())?;
+                let x = rest.as_deref().unwrap_or(&x_t0);
+                let session = SkippingSession::new(&mesh, x, *options)?;
+                built.insert(Built { mesh, session })
             };
             let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
             let contacts = session.detect(mesh, &query, pool)?;
