@@ -2,15 +2,17 @@
 //!
 //! Two scenes by formula. `folded`: a sheet of 25,088 triangles folded onto itself 3 mm apart, with waves, that moves
 //! and shivers, as a draped cloth does. `tangle`: a sheet of 99,856 triangles whose layers pass through each other within one step, with
-//! many contacts. The scenes of the published ground truth are timed by `compare_ipctk.py`, beside another library.
+//! many contacts. `session`: the coherent sequences of `cloth_benches::sequences`, 100,000 triangles, sessions against frames alone;
+//! an iteration is so many frames. The scenes of the published ground truth are timed by `compare_ipctk.py`, beside another library.
 
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(clippy::unwrap_used, reason = "a bench that cannot start has nothing to measure")]
 
+use cloth_benches::sequences::{folding, spinning_ball};
 use cloth_collision::mesh::{Vec3, generators};
 use cloth_collision::{
-    BruteForce, Bvh, CollisionMesh, Detector, Mode, Query, edge_edge_ccd, self_intersections,
-    vertex_triangle_ccd,
+    BruteForce, Bvh, CollisionMesh, Detector, Mode, Query, SessionOptions, SkippingSession, Variant,
+    edge_edge_ccd, self_intersections, vertex_triangle_ccd,
 };
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -84,6 +86,38 @@ fn scenes(c: &mut Criterion) {
     }
 }
 
+/// Frames of a sequence, and vertices of a side of its cloth.
+const FRAMES: u32 = 32;
+const SIDE: usize = 221;
+
+fn sessions(c: &mut Criterion) {
+    for (name, sequence) in [("spinning ball", spinning_ball(SIDE)), ("folding", folding(SIDE))] {
+        let sequence = sequence.unwrap();
+        let frames: Vec<Vec<Vec3>> = (0..=FRAMES).map(|k| sequence.at(k)).collect();
+        let mut group = c.benchmark_group(format!("session, {name}, {FRAMES} frames"));
+        group.sample_size(10);
+        for threads in [1, 2] {
+            let pool = pool(threads);
+            for variant in [Variant::NoDup, Variant::RTri, Variant::NSwD, Variant::SwD] {
+                let options = SessionOptions { variant, ..SessionOptions::default() };
+                group.bench_function(format!("{variant:?}, {threads} threads"), |b| {
+                    let start = || SkippingSession::new(&sequence.mesh, &sequence.rest, options).unwrap();
+                    let run = |mut session: SkippingSession| {
+                        for step in frames.windows(2) {
+                            let (x_t0, x_t1) = (&step[0], &step[1]);
+                            let mode = Mode::Continuous;
+                            let query = Query { x_t0, x_t1, thickness: 0.001, mode, active: None };
+                            black_box(session.detect(&sequence.mesh, &query, &pool).unwrap());
+                        }
+                    };
+                    b.iter_batched(start, run, BatchSize::PerIteration);
+                });
+            }
+        }
+        group.finish();
+    }
+}
+
 /// The oracle, on a mesh that it can do.
 fn brute(c: &mut Criterion) {
     let scene = folded(25, 0.003, 0.012);
@@ -117,5 +151,5 @@ fn pairs(c: &mut Criterion) {
     }
 }
 
-criterion_group!(detection, scenes, brute, pairs);
+criterion_group!(detection, scenes, sessions, brute, pairs);
 criterion_main!(detection);

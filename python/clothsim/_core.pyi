@@ -13,6 +13,7 @@ __all__ = [
     "BUILD_PROFILE",
     "Scene",
     "Simulation",
+    "SkippingSession",
     "__version__",
     "bending_laws",
     "bending_trace",
@@ -107,6 +108,29 @@ class Scene:
     def to_json(self) -> str: ...
     def files(self) -> list[tuple[str, bool, str]]: ...
     def fail(self, key: str, expected: str, got: str) -> None: ...
+
+@final
+class SkippingSession:
+    def __new__(
+        cls,
+        triangles: _Ints,
+        bodies: list[tuple[int, bool, bool]] | None,
+        rest: _Floats | None,
+        variant: str,
+        frames: int | None,
+        alpha: float | None,
+        first_frames: int,
+        most_frames: int,
+        beta: float,
+        gamma: float,
+        adapt: str,
+        low_curvature: bool,
+        threads: int | None,
+    ) -> SkippingSession: ...
+    def detect(
+        self, x_t0: _Floats, x_t1: _Floats, thickness: float, mode: str
+    ) -> tuple[tuple[_Ints, _Floats, _Ints, _Floats], dict[str, Any]]: ...
+    def restart(self) -> None: ...
 
 @final
 class Simulation:

@@ -1,8 +1,10 @@
 //! The contract of every detection method, and their names.
 
-use crate::{BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Query, Vec3};
+use crate::{
+    BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Query, SessionOptions, SkippingSession, Vec3,
+};
 
-const KNOWN: &str = "\"brute\", \"bvh\"";
+const KNOWN: &str = "\"brute\", \"bvh\", \"session\"";
 
 /// Finds every admissible pair in contact; see the crate's head for the contract.
 pub trait Detector: Send {
@@ -35,6 +37,7 @@ pub fn detector(name: &str, mesh: &CollisionMesh, x: &[Vec3]) -> Result<Box<dyn 
     match name {
         "brute" => Ok(Box::new(BruteForce)),
         "bvh" => Ok(Box::new(Bvh::new(mesh, x)?)),
+        "session" => Ok(Box::new(SkippingSession::new(mesh, x, SessionOptions::default())?)),
         _ => Err(DetectError::UnknownDetector { known: KNOWN, got: name.to_owned() }),
     }
 }

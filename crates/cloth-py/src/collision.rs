@@ -11,6 +11,14 @@ use crate::convert::{indices_to_numpy, queries_from, triangles_from, vertices_fr
 use crate::detach::{detached, pool};
 use crate::errors::{detect_error, device_error, invalid_input};
 
+/// `(vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge)`.
+pub(crate) type Pairs<'py> = (
+    Bound<'py, PyArray2<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<i64>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
 /// `(hit, time)`, both of length n.
 type Answers<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);
 
@@ -43,14 +51,7 @@ pub(crate) fn detect<'py>(
     cell_factor: Option<f64>,
 ) -> PyResult<Answer<'py>> {
     let device: Device = device.parse().map_err(|error| device_error(py, &error))?;
-    let mode = match mode {
-        "continuous" => Mode::Continuous,
-        "discrete" => Mode::Discrete,
-        other => {
-            let got = format!("\"{other}\"");
-            return Err(invalid_input(py, "mode", "one of \"continuous\", \"discrete\"", &got));
-        }
-    };
+    let mode = mode_from(py, mode)?;
     let x_t0 = vertices_from(x_t0, "x_t0")?;
     let x_t1 = vertices_from(x_t1, "x_t1")?;
     let triangles = triangles_from(triangles, "triangles", x_t0.len())?;
@@ -82,6 +83,18 @@ pub(crate) fn detect<'py>(
         stats,
         fallback,
     ))
+}
+
+/// The mode of that name.
+pub(crate) fn mode_from(py: Python<'_>, name: &str) -> PyResult<Mode> {
+    match name {
+        "continuous" => Ok(Mode::Continuous),
+        "discrete" => Ok(Mode::Discrete),
+        other => {
+            let got = format!("\"{other}\"");
+            Err(invalid_input(py, "mode", "one of \"continuous\", \"discrete\"", &got))
+        }
+    }
 }
 
 fn stats_to_dict<'py>(py: Python<'py>, detected: &Detected) -> PyResult<Bound<'py, PyDict>> {

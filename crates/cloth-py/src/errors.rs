@@ -86,7 +86,9 @@ pub(crate) fn detect_error(py: Python<'_>, error: &DetectError) -> PyErr {
         | DetectError::IndexOutOfRange { .. }
         | DetectError::RepeatedVertex { .. }
         | DetectError::TooLarge { .. }
-        | DetectError::OtherMesh { .. } => {
+        | DetectError::OtherMesh { .. }
+        | DetectError::ChangedTopology { .. }
+        | DetectError::ChangedBodies => {
             let message = error.to_string();
             exception(py, "InvalidInput", &message, |attributes| {
                 attributes.set_item("name", message.split(':').next())

@@ -11,6 +11,7 @@ mod errors;
 mod friction;
 mod mesh;
 mod scene;
+mod session;
 mod simulation;
 
 use pyo3::prelude::*;
@@ -45,6 +46,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(device::gpu_adapters, module)?)?;
     module.add_function(wrap_pyfunction!(device::lose_gpu, module)?)?;
     module.add_function(wrap_pyfunction!(device::let_auto_take_software, module)?)?;
+
+    module.add_class::<session::PySkippingSession>()?;
 
     module.add_class::<scene::PyScene>()?;
     module.add_function(wrap_pyfunction!(scene::scene_schema, module)?)?;

@@ -32,7 +32,7 @@ pub(crate) use absent::GpuDetector;
 pub use absent::{SharedGpu, adapters};
 
 /// Methods that run on the CPU; [`crate::collision::detector`] builds them.
-pub const CPU_METHODS: [&str; 2] = ["brute", "bvh"];
+pub const CPU_METHODS: [&str; 3] = ["brute", "bvh", "session"];
 /// Methods that run on a GPU.
 pub const GPU_METHODS: [&str; 4] = ["grid", "virtual-subdivision", "octree-single", "octree"];
 /// The method of `"auto"` on the CPU, and of a GPU's method where there is no GPU.
