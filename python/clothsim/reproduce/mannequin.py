@@ -18,7 +18,10 @@ from clothsim._arrays import Floats
 from clothsim.mesh import Mesh
 from clothsim.scene import Scene
 
-__all__ = ["HIP", "PELVIS", "THIGH", "Pose", "Walk", "add", "frame", "seated", "sit", "skirt", "smooth", "trousers"]
+__all__ = [
+    "HIP", "PELVIS", "THIGH", "Pose", "Walk", "add", "bones", "frame", "seated", "sit", "skirt", "smooth",
+    "trousers",
+]  # fmt: skip
 
 PELVIS = (0.115, 0.055)  # radius, half length of the straight part, along x
 HIP = (0.105, -0.05)  # joints, from the middle of the pelvis: aside, below
@@ -160,7 +163,7 @@ def frame(pose: Pose) -> tuple[Floats, Floats]:
     return np.array(pose.pelvis), _turn(1, pose.yaw)
 
 
-def _bones(pose: Pose) -> dict[str, tuple[Floats, Floats, float, float]]:
+def bones(pose: Pose) -> dict[str, tuple[Floats, Floats, float, float]]:
     """Middle, rotation (the capsule's axis is its y), radius and half length of each capsule."""
     place, body = frame(pose)
     bones: dict[str, tuple[Floats, Floats, float, float]] = {
@@ -213,7 +216,7 @@ def _axis_angle(matrix: Floats) -> dict[str, Any]:
 def add(scene: Scene, motion: Motion, duration: float, *, friction: float | None = None) -> None:
     """Add the figure's capsules to a scene as rigid colliders; the pelvis is called ``"pelvis"``."""
     times = np.linspace(0.0, duration, math.ceil(duration * _SAMPLES) + 1)
-    poses = [_bones(motion(float(t))) for t in times]
+    poses = [bones(motion(float(t))) for t in times]
     extra = {} if friction is None else {"friction": friction}
     for name, (_, _, radius, half) in poses[0].items():
         keyframes = [
