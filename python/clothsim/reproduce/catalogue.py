@@ -185,10 +185,10 @@ CATALOGUE = (
     _skipping(
         "4", "Expected free movement distance; probability of penetration free movement", module="skipping_figure_4"
     ),
-    _skipping("5", "Snapshots of experiment set one"),
-    _skipping("6", "Snapshots of experiment set two"),
+    _skipping("5", "Snapshots of experiment set one", module="skipping_figure_5"),
+    _skipping("6", "Snapshots of experiment set two", module="skipping_figure_6"),
     _skipping("7", "Experiment set two: performance statistics of animation two, three and four"),
-    _skipping("1", "The model complexities", INPUT, kind="table"),
+    _skipping("1", "The model complexities", module="skipping_table_1", kind="table"),
     _skipping("2", "Performance statistics of experiment set one", kind="table"),
     _skipping("9.3", "Comparison with other methods: spinning ball", kind="section"),
 )
