@@ -1,3 +1,4 @@
 //! Bench bodies by stage and by scene.
 
 pub mod incline;
+pub mod sequences;

@@ -39,6 +39,20 @@ impl<const ENDS: usize> MovingBox<ENDS> {
         out
     }
 
+    /// The box of this half side \[m\] around a point \[m\].
+    #[inline]
+    pub(crate) fn around(point: [f32; 3], half: f64) -> Self {
+        let mut out = Self::EMPTY;
+        for end in 0..ENDS {
+            for axis in 0..3 {
+                let d = f64::from(point[axis]);
+                out.lo[end][axis] = round_down(d - half, d);
+                out.hi[end][axis] = -round_down(-d - half, d);
+            }
+        }
+        out
+    }
+
     #[inline]
     pub(crate) fn grow(&mut self, other: &Self) {
         for end in 0..ENDS {

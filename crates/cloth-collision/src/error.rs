@@ -79,6 +79,15 @@ pub enum DetectError {
         /// Triangles of the mesh that came.
         got: usize,
     },
+    /// A triangle has other vertices than when the detector was built.
+    #[error("mesh: expected the topology that the detector was built for, triangle {triangle} has changed")]
+    ChangedTopology {
+        /// The first such triangle.
+        triangle: usize,
+    },
+    /// The rules of the bodies are others than when the detector was built.
+    #[error("mesh: expected the bodies that the detector was built for")]
+    ChangedBodies,
     /// A detector that works on another device got no answer from it.
     #[error("detector \"{detector}\": {reason}")]
     Device {

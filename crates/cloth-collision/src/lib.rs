@@ -32,6 +32,7 @@ mod error;
 mod intersect;
 mod narrow;
 mod nearest;
+mod session;
 mod stencil;
 
 pub use brute::BruteForce;
@@ -44,6 +45,9 @@ pub use error::DetectError;
 pub use intersect::{intersections, self_intersections};
 pub use narrow::NarrowPhase;
 pub use nearest::Nearest;
+pub use session::{
+    Adapt, FrameKind, Frames, MOST_FRAMES, SessionOptions, SessionStats, SkippingSession, Variant,
+};
 pub use stencil::{Stencil, StencilKind, stencil_at_contact_edge_edge, stencil_at_contact_vertex_triangle};
 
 /// A point [m] in space.

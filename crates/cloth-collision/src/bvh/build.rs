@@ -12,46 +12,46 @@ use std::ops::Range;
 /// A node is a block: its lanes are triangles in a leaf, blocks of the level below elsewhere. Blocks are numbered
 /// by level, the leaves first, and within a level by body.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Tree {
-    pub(super) leaves: Vec<Leaf>,
+pub(crate) struct Tree {
+    pub(crate) leaves: Vec<Leaf>,
     /// Triangles of each leaf, [`NONE`] in unused lanes.
-    pub(super) triangle_ids: Vec<[u32; LANES]>,
+    pub(crate) triangle_ids: Vec<[u32; LANES]>,
     /// Their vertices, `[corner][lane]`.
-    pub(super) corners: Vec<[[u32; LANES]; 3]>,
+    pub(crate) corners: Vec<[[u32; LANES]; 3]>,
     /// Vertices owned by the triangles of a leaf, in blocks.
-    pub(super) vertex_ids: Vec<[u32; LANES]>,
+    pub(crate) vertex_ids: Vec<[u32; LANES]>,
     /// Edges owned by the triangles of a leaf, in blocks.
-    pub(super) edge_ids: Vec<[u32; LANES]>,
+    pub(crate) edge_ids: Vec<[u32; LANES]>,
     /// The blocks above the leaves.
-    pub(super) inner: Vec<Inner>,
-    pub(super) roots: Vec<Root>,
+    pub(crate) inner: Vec<Inner>,
+    pub(crate) roots: Vec<Root>,
 }
 
 /// A leaf: its number of triangles and the ranges of its feature blocks.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Leaf {
-    pub(super) count: u32,
-    pub(super) vertex_blocks: [u32; 2],
-    pub(super) edge_blocks: [u32; 2],
+pub(crate) struct Leaf {
+    pub(crate) count: u32,
+    pub(crate) vertex_blocks: [u32; 2],
+    pub(crate) edge_blocks: [u32; 2],
 }
 
 /// A block of `count` blocks from `first` on.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Inner {
-    pub(super) first: u32,
-    pub(super) count: u32,
+pub(crate) struct Inner {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
 }
 
 /// The block above all triangles of a body.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Root {
-    pub(super) block: u32,
-    pub(super) body: u32,
+pub(crate) struct Root {
+    pub(crate) block: u32,
+    pub(crate) body: u32,
 }
 
 impl Tree {
     /// Memory \[B\].
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         fn held<T>(list: &Vec<T>) -> usize {
             list.capacity() * size_of::<T>()
         }
@@ -64,13 +64,13 @@ impl Tree {
             + held(&self.roots)
     }
 
-    pub(super) fn block_count(&self) -> usize {
+    pub(crate) fn block_count(&self) -> usize {
         self.leaves.len() + self.inner.len()
     }
 
     /// The block, if it is above the leaves.
     #[inline(always)]
-    pub(super) fn inner(&self, block: u32) -> Option<&Inner> {
+    pub(crate) fn inner(&self, block: u32) -> Option<&Inner> {
         self.inner.get((block as usize).wrapping_sub(self.leaves.len()))
     }
 }
@@ -78,7 +78,7 @@ impl Tree {
 /// Median splits of each body's triangles along the longest axis of their centroids' box, down to full leaves.
 ///
 /// The splits run on the pool, if there is one; they do not depend on it.
-pub(super) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::ThreadPool>) -> Tree {
+pub(crate) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::ThreadPool>) -> Tree {
     let origin = middle(x);
     let item = |(t, tri): (usize, &[u32; 3])| {
         // Thirds before the sum: no overflow.

@@ -18,17 +18,17 @@ pub(crate) struct Candidates {
 /// Pairs of triangles of one task, waiting for the exact test. A triangle is named by its place in the leaves: leaf times
 /// [`LANES`] plus lane.
 #[derive(Debug, Default)]
-pub(super) struct TrianglePairs {
+pub(crate) struct TrianglePairs {
     /// Without a common vertex.
-    pub(super) strangers: Vec<[u32; 2]>,
+    pub(crate) strangers: Vec<[u32; 2]>,
     /// With one common vertex.
-    pub(super) joined: Vec<[u32; 2]>,
+    pub(crate) joined: Vec<[u32; 2]>,
 }
 
 /// Pairs of features of the leaves `a` and `b` (once each if they are equal) whose boxes overlap. Pairs that share a
 /// vertex are among them, and pairs with an unused lane ([`cloth_mesh::NONE`]) where boxes reach to infinity.
 #[inline]
-pub(super) fn features<const ENDS: usize>(
+pub(crate) fn features<const ENDS: usize>(
     tree: &Tree,
     boxes: &Boxes<ENDS>,
     a: u32,
@@ -47,7 +47,7 @@ pub(super) fn features<const ENDS: usize>(
 /// Pairs of triangles of the leaves `a` and `b` (once each if they are equal) whose boxes overlap and that have at most
 /// one common vertex.
 #[inline]
-pub(super) fn triangles(tree: &Tree, boxes: &Boxes<1>, a: u32, b: u32, out: &mut TrianglePairs) {
+pub(crate) fn triangles(tree: &Tree, boxes: &Boxes<1>, a: u32, b: u32, out: &mut TrianglePairs) {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.

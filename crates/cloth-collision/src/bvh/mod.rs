@@ -4,16 +4,16 @@
 //! [`traverse`] meets the tree with itself and [`leaf_pair`] the features of two leaves, each feature from the one triangle that owns it;
 //! [`narrow`] decides what they yield while it streams by.
 
-mod build;
+pub(crate) mod build;
 mod intersections;
-mod leaf_pair;
+pub(crate) mod leaf_pair;
 pub(crate) mod narrow;
 mod proximity;
-mod refit;
+pub(crate) mod refit;
 pub(crate) mod traverse;
 mod validate;
 
-use crate::bounds::LANES;
+use crate::bounds::{LANES, MovingBox, middle};
 use crate::contact::check_positions;
 use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use build::Tree;
@@ -31,9 +31,9 @@ const LEAF_TRIANGLES: usize = LANES;
 pub struct Bvh {
     vertex_count: usize,
     triangle_count: usize,
-    tree: Tree,
-    moving: Boxes<2>,
-    still: Boxes<1>,
+    pub(crate) tree: Tree,
+    pub(crate) moving: Boxes<2>,
+    pub(crate) still: Boxes<1>,
 }
 
 impl Bvh {
@@ -75,7 +75,7 @@ impl Bvh {
             + Boxes::<1>::bytes(&self.tree, self.vertex_count)
     }
 
-    fn check_mesh(&self, mesh: &CollisionMesh) -> Result<(), DetectError> {
+    pub(crate) fn check_mesh(&self, mesh: &CollisionMesh) -> Result<(), DetectError> {
         if mesh.triangles.len() == self.triangle_count && mesh.vertex_count == self.vertex_count {
             return Ok(());
         }
@@ -83,8 +83,17 @@ impl Bvh {
     }
 
     /// Fits the boxes at rest to the end of the step.
-    fn refit_still(&mut self, mesh: &CollisionMesh, query: &Query<'_>, pool: &rayon::ThreadPool) {
-        self.still.refit(&self.tree, mesh, [query.x_t1], margin(query), query.active, pool);
+    pub(crate) fn refit_still(&mut self, mesh: &CollisionMesh, query: &Query<'_>, pool: &rayon::ThreadPool) {
+        let (origin, margin) = (middle(query.x_t1), margin(query));
+        let of_vertex = |v: usize| MovingBox::of_vertex(&[query.x_t1], v, &origin, margin);
+        self.still.refit(&self.tree, mesh, of_vertex, query.active, pool);
+    }
+
+    /// Fits the moving boxes to the step.
+    pub(crate) fn refit_moving(&mut self, mesh: &CollisionMesh, query: &Query<'_>, pool: &rayon::ThreadPool) {
+        let (x, origin, margin) = ([query.x_t0, query.x_t1], middle(query.x_t0), margin(query));
+        let of_vertex = |v: usize| MovingBox::of_vertex(&x, v, &origin, margin);
+        self.moving.refit(&self.tree, mesh, of_vertex, query.active, pool);
     }
 }
 
@@ -109,8 +118,7 @@ impl Detector for Bvh {
         let start = Instant::now();
         let is_moving = query.mode == Mode::Continuous;
         if is_moving {
-            let x = [query.x_t0, query.x_t1];
-            self.moving.refit(&self.tree, mesh, x, margin(query), query.active, pool);
+            self.refit_moving(mesh, query, pool);
         } else {
             self.refit_still(mesh, query, pool);
         }

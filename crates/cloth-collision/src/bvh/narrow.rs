@@ -8,6 +8,10 @@ use crate::ccd::filter::{
 use crate::ccd::{edge_edge_march, vertex_triangle_march};
 use crate::{CollisionMesh, Contacts, Mode, Query, Vec3};
 use cloth_mesh::NONE;
+use rayon::prelude::*;
+
+/// Vertices of one task at least.
+const VERTEX_CHUNK: usize = 4096;
 
 /// Both ends of a vertex's motion, in one cache line.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +33,14 @@ impl<'a> Scene<'a> {
             query,
             motion: start.iter().zip(query.x_t1).map(|(a, b)| Motion([row(a), row(b)])).collect(),
         }
+    }
+
+    /// [`Scene::new`] on a pool.
+    pub(crate) fn new_in(mesh: &'a CollisionMesh, query: &'a Query<'a>, pool: &rayon::ThreadPool) -> Self {
+        let start = if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 };
+        let both = start.par_iter().zip(query.x_t1).with_min_len(VERTEX_CHUNK);
+        let motion = pool.install(|| both.map(|(a, b)| Motion([row(a), row(b)])).collect());
+        Self { mesh, query, motion }
     }
 
     fn is_wanted(&self, first: &[u32], second: &[u32]) -> bool {

@@ -19,13 +19,13 @@ const FLUSH: usize = 2048;
 
 /// Counts of a traversal.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct TraverseCounts {
-    pub(super) box_tests: u64,
-    pub(super) leaf_pairs: u64,
+pub(crate) struct TraverseCounts {
+    pub(crate) box_tests: u64,
+    pub(crate) leaf_pairs: u64,
 }
 
 /// What is done with the pairs of leaves of one task; the visits of all tasks are handed back in their order.
-pub(super) trait Visit<const ENDS: usize>: Send {
+pub(crate) trait Visit<const ENDS: usize>: Send {
     /// Two leaves whose boxes overlap (or one, twice).
     fn leaf_pair(&mut self, leaves: &LeafPairs<'_, ENDS>, a: u32, b: u32);
     /// There is no further pair.
@@ -34,9 +34,9 @@ pub(super) trait Visit<const ENDS: usize>: Send {
 
 /// The leaves that a [`Visit`] is called with.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LeafPairs<'a, const ENDS: usize> {
-    pub(super) tree: &'a Tree,
-    pub(super) boxes: &'a Boxes<ENDS>,
+pub(crate) struct LeafPairs<'a, const ENDS: usize> {
+    pub(crate) tree: &'a Tree,
+    pub(crate) boxes: &'a Boxes<ENDS>,
 }
 
 /// What is done with candidates.
@@ -46,13 +46,13 @@ pub(crate) trait Sink: Send {
 }
 
 /// Streams the feature pairs of leaves into a sink.
-pub(super) struct Streaming<S> {
+pub(crate) struct Streaming<S> {
     candidates: Candidates,
-    pub(super) sink: S,
+    pub(crate) sink: S,
 }
 
 impl<S> Streaming<S> {
-    pub(super) fn new(sink: S) -> Self {
+    pub(crate) fn new(sink: S) -> Self {
         Self { candidates: Candidates::default(), sink }
     }
 }
@@ -94,7 +94,7 @@ impl<const ENDS: usize> Walk<'_, ENDS> {
         pairs
     }
 
-    /// Replaces a pair by its children's pairs; false if both are leaves.
+    /// Replaces a pair by its children's pairs, or by nothing; false if both are leaves.
     #[inline(always)]
     fn expand(
         &self,
@@ -104,6 +104,9 @@ impl<const ENDS: usize> Walk<'_, ENDS> {
         mut push: impl FnMut((u32, u32)),
     ) -> bool {
         let LeafPairs { tree, boxes } = self.leaves;
+        if a == b && boxes.lanes[a as usize].is_flat {
+            return true;
+        }
         let (Some(inner_a), Some(inner_b)) = (tree.inner(a), tree.inner(b)) else { return false };
         let (block_a, block_b) = (&boxes.blocks[a as usize], &boxes.blocks[b as usize]);
         let (lanes_a, lanes_b) = (boxes.lanes[a as usize], boxes.lanes[b as usize]);
@@ -175,7 +178,7 @@ impl<const ENDS: usize> Walk<'_, ENDS> {
 }
 
 /// Meets the trees with each other and themselves: the visits in the order of their tasks.
-pub(super) fn traverse<const ENDS: usize, V: Visit<ENDS>>(
+pub(crate) fn traverse<const ENDS: usize, V: Visit<ENDS>>(
     tree: &Tree,
     boxes: &Boxes<ENDS>,
     mesh: &CollisionMesh,

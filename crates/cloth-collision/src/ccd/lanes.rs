@@ -278,6 +278,15 @@ pub(crate) mod avx {
     }
 
     impl Eight {
+        /// The lanes in order.
+        #[inline(always)]
+        pub(crate) fn to_array(self) -> [f32; 8] {
+            let mut out = [0.0; 8];
+            // SAFETY: a value exists only where the processor has AVX2; 32 writable bytes.
+            unsafe { arch::_mm256_storeu_ps(out.as_mut_ptr(), self.0) };
+            out
+        }
+
         /// The first three entries of eight rows, by entry.
         ///
         /// # Safety

@@ -1,0 +1,214 @@
+//! How many frames the next session lasts, from what the last ones cost.
+
+use super::options::Frames;
+
+/// Frames without a session after one that did not pay; doubled each time that it happens again, up to the larger number.
+const PAUSE: [u32; 2] = [8, 128];
+/// Frames after which one frame alone says again what detection costs without a session.
+const MEASURE_AGAIN: u32 = 64;
+
+/// What the next frame is to be if no session goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Plan {
+    /// Tree update and traversal for one frame alone.
+    Alone,
+    /// A session of so many frames with this α.
+    Session { frames: u32, alpha: f64 },
+}
+
+/// n_f by cost per frame, whatever its unit. While it gets better from session to session, n_f moves on by one; when it gets
+/// worse, n_f turns round; above the cost without a session it is halved. At one frame, sessions pause.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Adaptation {
+    rule: Frames,
+    frames: u32,
+    is_growing: bool,
+    previous: Option<f64>,
+    /// Cost of a frame alone.
+    alone: Option<f64>,
+    since_alone: u32,
+    pause: u32,
+    paused: u32,
+    /// Of the present session.
+    cost: f64,
+    count: u32,
+    first: f64,
+}
+
+impl Adaptation {
+    pub(super) fn new(rule: Frames) -> Self {
+        let (Frames::Fixed { frames, .. } | Frames::Adaptive { first: frames, .. }) = rule;
+        Self {
+            rule,
+            frames,
+            is_growing: true,
+            previous: None,
+            alone: None,
+            since_alone: 0,
+            pause: PAUSE[0],
+            paused: 0,
+            cost: 0.0,
+            count: 0,
+            first: 0.0,
+        }
+    }
+
+    pub(super) fn plan(&self) -> Plan {
+        match self.rule {
+            Frames::Fixed { frames: 1, .. } | Frames::Adaptive { most: 1, .. } => Plan::Alone,
+            Frames::Fixed { frames, alpha } => {
+                Plan::Session { frames, alpha: alpha.unwrap_or(f64::from(frames - 1)) }
+            }
+            Frames::Adaptive { .. } => {
+                if self.paused > 0 || self.alone.is_none() || self.since_alone >= MEASURE_AGAIN {
+                    return Plan::Alone;
+                }
+                let frames = self.frames.max(2);
+                Plan::Session { frames, alpha: f64::from(frames - 1) }
+            }
+        }
+    }
+
+    /// A frame alone was this dear. `was_planned`: the plan said so, not the motion.
+    pub(super) fn frame_alone(&mut self, cost: f64, was_planned: bool) {
+        if was_planned {
+            self.alone = Some(cost);
+            self.since_alone = 0;
+            self.paused = self.paused.saturating_sub(1);
+        }
+    }
+
+    /// A session's first frame (with the end of the one before) was this dear.
+    pub(super) fn first_frame(&mut self, cost: f64) {
+        self.session_ends();
+        (self.cost, self.count, self.first) = (cost, 1, cost);
+        self.since_alone += 1;
+    }
+
+    /// A further frame was this dear. True if the session had better end: a new one costs less than this frame did.
+    pub(super) fn further_frame(&mut self, cost: f64) -> bool {
+        self.cost += cost;
+        self.count += 1;
+        self.since_alone += 1;
+        let is_worse = cost > self.first && matches!(self.rule, Frames::Adaptive { .. });
+        if is_worse {
+            self.session_ends();
+            self.frames = self.frames.saturating_sub(1).max(1);
+            self.is_growing = false;
+        }
+        is_worse
+    }
+
+    /// Another call about the same frame.
+    pub(super) fn same_frame(&mut self, cost: f64) {
+        self.cost += cost;
+    }
+
+    /// The present session, if there is one, is over.
+    pub(super) fn session_ends(&mut self) {
+        let Frames::Adaptive { most, .. } = self.rule else { return };
+        if self.count == 0 {
+            return;
+        }
+        let average = self.cost / f64::from(self.count);
+        self.count = 0;
+        if self.previous.is_some_and(|previous| average > previous) {
+            self.is_growing = !self.is_growing;
+        }
+        let pays = self.alone.is_none_or(|alone| average < alone);
+        self.previous = Some(average);
+        if !pays {
+            self.frames = (self.frames / 2).max(1);
+        } else if self.is_growing {
+            self.frames = (self.frames + 1).min(most);
+        } else {
+            self.frames = (self.frames - 1).max(1);
+        }
+        if pays {
+            self.pause = PAUSE[0];
+        }
+        if self.frames == 1 {
+            self.paused = self.pause;
+            self.pause = (2 * self.pause).min(PAUSE[1]);
+            self.previous = None;
+            self.is_growing = true;
+            self.frames = 2.min(most);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs with the given cost of a session's first and further frames and of a frame alone; n_f of each session.
+    fn sessions(rule: Frames, first: impl Fn(u32) -> f64, further: f64, alone: f64, frames: u32) -> Vec<u32> {
+        let mut adaptation = Adaptation::new(rule);
+        let (mut seen, mut left) = (vec![], 0);
+        for _ in 0..frames {
+            if left > 0 {
+                left = if adaptation.further_frame(further) { 0 } else { left - 1 };
+                continue;
+            }
+            adaptation.session_ends();
+            match adaptation.plan() {
+                Plan::Alone => {
+                    adaptation.frame_alone(alone, true);
+                    seen.push(1);
+                }
+                Plan::Session { frames, alpha } => {
+                    assert_eq!(alpha, f64::from(frames - 1));
+                    adaptation.first_frame(first(frames));
+                    seen.push(frames);
+                    left = frames - 1;
+                }
+            }
+        }
+        seen
+    }
+
+    const RULE: Frames = Frames::Adaptive { first: 4, most: 20 };
+
+    #[test]
+    fn sessions_grow_while_they_get_cheaper() {
+        let seen = sessions(RULE, |_| 10.0, 1.0, 8.0, 300);
+        assert_eq!(seen[..4], [1, 4, 5, 6]);
+        assert_eq!(*seen.iter().max().unwrap(), 20);
+        assert!(seen[1..].contains(&1), "measured again: {seen:?}");
+    }
+
+    #[test]
+    fn sessions_settle_where_they_are_cheapest() {
+        // 10/n + 0.1 n: cheapest at 10.
+        let seen = sessions(RULE, |n| 10.0 + 0.1 * f64::from(n * n), 0.5, 80.0, 2000);
+        let last = &seen[seen.len() - 20..];
+        assert!(last.iter().all(|&n| n == 1 || (7..=13).contains(&n)), "{last:?}");
+    }
+
+    #[test]
+    fn sessions_that_do_not_pay_pause_longer_and_longer() {
+        let seen = sessions(RULE, |_| 20.0, 9.0, 8.0, 400);
+        let tries = seen.iter().filter(|&&n| n > 1).count();
+        assert!(tries > 3 && tries < 14, "{seen:?}");
+    }
+
+    #[test]
+    fn a_frame_dearer_than_a_new_session_ends_it() {
+        let mut adaptation = Adaptation::new(RULE);
+        adaptation.frame_alone(8.0, true);
+        adaptation.first_frame(10.0);
+        assert!(!adaptation.further_frame(10.0));
+        assert!(adaptation.further_frame(10.5));
+        assert_eq!(adaptation.frames, 3);
+    }
+
+    #[test]
+    fn fixed_numbers_stay() {
+        let fixed = Frames::Fixed { frames: 7, alpha: None };
+        assert!(sessions(fixed, |_| 10.0, 9.0, 8.0, 100).iter().all(|&n| n == 7));
+        let one = Frames::Fixed { frames: 1, alpha: None };
+        assert!(sessions(one, |_| 10.0, 9.0, 8.0, 100).iter().all(|&n| n == 1));
+        let alpha = Frames::Fixed { frames: 3, alpha: Some(0.5) };
+        assert_eq!(Adaptation::new(alpha).plan(), Plan::Session { frames: 3, alpha: 0.5 });
+    }
+}
