@@ -15,11 +15,11 @@ from clothsim.reproduce.animations.bodies import capsule
 
 __all__ = ["Garment"]
 
-TOP, HEM, OUTER = 0.02, 0.42, 0.24  # waist above, hems of the two layers below the middle of the pelvis [m]
+TOP, HEM, OUTER = 0.02, 0.42, 0.244  # waist above, hems of the two layers below the middle of the pelvis [m]
 WAIST, FLARE = -0.03, 0.13  # room about the hull of the figure at the waist, and how much more at the hem [m]
 WAVES, WAVE = 12, 0.016  # of the hem [m]
 NEAREST = 0.8  # least distance of the inner layer from the figure's hull, over the thickness
-BETWEEN = (0.8, 0.4)  # distance of the layers, over the thickness: least, and by how much it varies
+BETWEEN = (0.85, 1.0)  # distance of the layers, over the thickness: least, and by how much it varies
 AROUND = 0.9  # length of a ring that sets the thickness [m]
 SMOOTH = 0.008  # m: over which the skirt passes from hanging to being pushed
 STEEP = 0.25
@@ -81,7 +81,7 @@ class Garment:
             *((name, False, len(points), own) for name, (points, own) in meshes.items()),
         ])  # fmt: skip
         places = []
-        for (_, rows), hem, shift in zip(layers, (HEM, OUTER), (0.0, 0.5), strict=True):
+        for (_, rows), hem, shift in zip(layers, (HEM, OUTER), (0.0, 0.25), strict=True):
             angle, y = np.meshgrid(
                 2.0 * math.pi * (np.arange(self.around) + shift) / self.around, np.linspace(TOP, -hem, rows + 1)
             )
