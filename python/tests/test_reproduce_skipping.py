@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clothsim.reproduce import Effort, reproduce, skipping_figure_4
+import clothsim as cs
+from clothsim.reproduce import Effort, reproduce, skipping_figure_4, skipping_report, skipping_run
+from clothsim.reproduce.animations import SETS, Listed
+from clothsim.reproduce.skipping_run import ADAPTIVE, EVERY_FRAME, Run
 
 # Figure 4 -----------------------------------------------------------------------------------------------------------
 
@@ -53,3 +56,71 @@ def test_a_wrong_simulation_fails_figure_4(
     outcome = reproduce("2010-4", tmp_path / "out", Effort(quick=True))
     assert outcome.line.startswith("the paper: ")
     assert any(check.what.startswith(caught) for check in outcome.checks if not check.passed)
+
+
+# Sessions ----------------------------------------------------------------------------------------------------------
+
+FRAMES = 20
+LISTED = [(experiment, listed) for experiment, group in SETS.items() for listed in group]
+SWD = {**ADAPTIVE, **skipping_run.fixed((3, 4), (15, 16))}
+
+
+def run(experiment: str, listed: Listed, variants: Any, **options: Any) -> Run:
+    with Effort().bar(FRAMES, "test") as bar:
+        return skipping_run.run(experiment, listed, variants, FRAMES, bar, quick=True, **options)
+
+
+@pytest.mark.parametrize("self_collision", [True, False])
+@pytest.mark.parametrize(("experiment", "listed"), LISTED, ids=[f"{e}-{item.number}" for e, item in LISTED])
+def test_every_frame_is_that_of_bvh(experiment: str, listed: Listed, self_collision: bool) -> None:
+    made = run(experiment, listed, SWD, self_collision=self_collision)
+    assert (made.compared, made.wrong, made.different) == (FRAMES, 0, 0)
+    for series in made.series.values():
+        assert series.skipped > 0.5
+        assert series.sum("colliding") > 0
+
+
+def test_counts_are_the_same_each_time() -> None:
+    one, two = (run("one", SETS["one"][0], {**EVERY_FRAME, **ADAPTIVE}) for _ in range(2))
+    for name, series in one.series.items():
+        assert series.counts == two.series[name].counts
+        assert series.kinds == two.series[name].kinds
+
+
+@pytest.mark.parametrize(
+    ("fault", "caught"),
+    [
+        (lambda d: cs.collision.Detection(d.vertex_triangle[1:], d.time_vertex_triangle[1:], d.edge_edge,
+                                          d.time_edge_edge, d.stats), "frames that differ from bvh"),
+        (lambda d: cs.collision.Detection(d.vertex_triangle, np.nextafter(d.time_vertex_triangle, 1.0), d.edge_edge,
+                                          d.time_edge_edge, d.stats), "frames that differ from bvh"),
+        (lambda d: cs.collision.Detection(d.vertex_triangle, d.time_vertex_triangle, d.edge_edge, d.time_edge_edge,
+                                          {**d.stats, "pair_bytes": 49 * d.stats["pending"]}), "a stored pair takes"),
+        (lambda d: cs.collision.Detection(d.vertex_triangle, d.time_vertex_triangle, d.edge_edge, d.time_edge_edge,
+                                          {**d.stats, "admissible": d.stats["pending"] + 1}), "colliding ≤ admissible"),
+    ],
+    ids=["lost", "late", "memory", "count"],
+)  # fmt: skip
+def test_a_wrong_session_is_reported(monkeypatch: pytest.MonkeyPatch, fault: Any, caught: str) -> None:
+    right = cs.collision.SkippingSession.detect
+    monkeypatch.setattr(cs.collision.SkippingSession, "detect", lambda *a, **k: fault(right(*a, **k)))
+    made = run("one", SETS["one"][2], ADAPTIVE)
+    failed = [check.what for check in skipping_report.checks([made]) if not check.passed]
+    assert len(failed) == 1
+    assert failed[0].startswith(caught)
+
+
+def test_sessions_that_differ_among_each_other_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = cs.collision.SkippingSession.detect
+
+    def detect(session: Any, *arguments: Any) -> Any:
+        d = right(session, *arguments)
+        if d.stats["frame"] != "skipping":
+            return d
+        return cs.collision.Detection(d.vertex_triangle, d.time_vertex_triangle, d.edge_edge[:-1],
+                                      d.time_edge_edge[:-1], d.stats)  # fmt: skip
+
+    monkeypatch.setattr(cs.collision.SkippingSession, "detect", detect)
+    made = run("one", SETS["one"][2], {"NoDup": EVERY_FRAME["NoDup"], **ADAPTIVE})
+    assert made.wrong == 0
+    assert made.different > FRAMES // 2

@@ -187,10 +187,12 @@ CATALOGUE = (
     ),
     _skipping("5", "Snapshots of experiment set one", module="skipping_figure_5"),
     _skipping("6", "Snapshots of experiment set two", module="skipping_figure_6"),
-    _skipping("7", "Experiment set two: performance statistics of animation two, three and four"),
+    _skipping(
+        "7", "Experiment set two: performance statistics of animation two, three and four", module="skipping_figure_7"
+    ),
     _skipping("1", "The model complexities", module="skipping_table_1", kind="table"),
-    _skipping("2", "Performance statistics of experiment set one", kind="table"),
-    _skipping("9.3", "Comparison with other methods: spinning ball", kind="section"),
+    _skipping("2", "Performance statistics of experiment set one", module="skipping_table_2", kind="table"),
+    _skipping("9.3", "Comparison with other methods: spinning ball", module="skipping_section_9_3", kind="section"),
 )
 
 

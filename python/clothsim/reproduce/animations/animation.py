@@ -59,6 +59,8 @@ class Animation:
         How many there are.
     at : callable
         Positions (n, 3) [m] at a time [s].
+    rest : (n, 3) float64
+        Positions [m] with the cloth spread out, away from the bodies: what lies together there belongs together.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Animation:
     dt: float
     frames: int
     at: Callable[[float], Floats]
+    rest: Floats
 
     def frame(self, index: int) -> Floats:
         """Positions (n, 3) [m] of the frame of that index, from 0."""

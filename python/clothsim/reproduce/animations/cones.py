@@ -25,7 +25,7 @@ NECK = (0.6, 0.6)  # distance of pleats from each other, over the thickness: lea
 BLEND = 0.015  # m: over which the sheet passes from a cone to the sag between them
 LEVEL, SINKING = 0.17, 0.06  # height of the sag [m], and how fast it sinks [m/s]
 DRIFT = 0.05  # m/s
-FALL, LANDED = 0.03, 0.3  # the sheet comes down from so high [m] in so long [s]
+FALL, LANDED = 0.006, 0.07  # the sheet comes down from so high [m] in so long [s]
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Cones:
     name: str
     cells: tuple[int, int]
     frames: int = 61
-    dt: float = 0.01
+    dt: float = 0.0025
 
     @property
     def thickness(self) -> float:
@@ -69,7 +69,8 @@ class Cones:
         def at(time: float) -> Floats:
             return np.concatenate([self._cloth(x, z, time), standing])
 
-        return Animation(self.name, triangles, parts, self.thickness, self.dt, self.frames, at)
+        rest = np.concatenate([np.column_stack([1.5 * x, np.full(len(x), 2.0), z]), standing])
+        return Animation(self.name, triangles, parts, self.thickness, self.dt, self.frames, at, rest)
 
     def _cloth(self, x: Floats, z: Floats, time: float) -> Floats:
         band = np.min(np.abs(x[:, None] - np.array(BANDS)), axis=1)

@@ -26,8 +26,8 @@ LOOSE = 0.6  # from here on the cloth may turn and sway against the body
 NEAREST = 0.7  # distance of cloth on the body, over the thickness
 # Distance of pleats from each other over the thickness: least, and by how much it varies.
 NECK = (0.6, 0.6)
-FALL = 0.03  # from so high the cloth comes down onto the body [m]
-LANDED = 0.3  # after so long [s]
+FALL = 0.006  # from so high the cloth comes down onto the body [m]
+LANDED = 0.07  # after so long [s]
 
 Relief = Callable[[Floats, float], Floats]
 
@@ -75,7 +75,7 @@ class Drape:
     sway: float = 0.03
     path: float = 0.0
     frames: int = 61
-    dt: float = 0.01
+    dt: float = 0.0025
 
     @property
     def thickness(self) -> float:
@@ -99,7 +99,9 @@ class Drape:
             body += self._place(np.zeros(len(body)), time)
             return np.concatenate([self._cloth(star, radii, s, angle, time), body])
 
-        return Animation(self.name, triangles, parts, self.thickness, self.dt, self.frames, at)
+        flat = np.column_stack([x, np.full(len(x), 2.0), z])
+        rest = np.concatenate([flat, RADIUS * star.directions])
+        return Animation(self.name, triangles, parts, self.thickness, self.dt, self.frames, at, rest)
 
     def _relief(self, directions: Floats, time: float) -> Floats:
         return np.zeros(len(directions)) if self.relief is None else self.relief(directions, time)

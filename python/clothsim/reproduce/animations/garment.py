@@ -62,7 +62,7 @@ class Garment:
     walk: mannequin.Walk = field(default_factory=lambda: mannequin.Walk(period=2.1))
     start: float = 1.6
     frames: int = 61
-    dt: float = 0.005
+    dt: float = 0.0025
 
     @property
     def thickness(self) -> float:
@@ -99,7 +99,13 @@ class Garment:
             figure = [bones[name][0] + points @ bones[name][1].T for name, (points, _) in meshes.items()]
             return np.concatenate([*cloth, *figure])
 
-        return Animation(self.name, triangles, parts, self.thickness, self.dt, self.frames, at)
+        radius = AROUND / (2.0 * math.pi)
+        tubes = [
+            np.column_stack([radius * np.sin(angle), y + 3.0 + number, radius * np.cos(angle)])
+            for number, (angle, y) in enumerate(places)
+        ]
+        rest = np.concatenate([*tubes, at(0.0)[sum(map(len, tubes)) :]])
+        return Animation(self.name, triangles, parts, self.thickness, self.dt, self.frames, at, rest)
 
     def _layer(self, hull: Floats, angle: Floats, y: Floats, time: float, *, outer: bool) -> Floats:
         """Places of a layer, from the middle of the pelvis in its axes."""

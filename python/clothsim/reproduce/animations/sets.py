@@ -100,7 +100,7 @@ SETS = {
                replace(_GARMENT, around=80, rows=(20, 12), capsules=(12, 4, 6)).animation),
     ),
     "two": (
-        _drape("one", "ridged ball, with self-collision", 11e3, 320e3, _RIDGED, _coarse(_RIDGED)),
+        _drape("one", "ridged ball", 11e3, 320e3, _RIDGED, _coarse(_RIDGED)),
         _drape("two", "deformable body", 7e3, 500e3, _SWELLING, _coarse(_SWELLING)),
         _drape("three", "faceted body", 1e3, 502e3, _FACETED, _coarse(_FACETED, body=6)),
         _drape("four", "finely ridged body", 40e3, 500e3, _FINE, _coarse(_FINE, body=16)),
