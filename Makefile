@@ -35,6 +35,7 @@ test-python: build ## Behavioural tests through the Python package and the comma
 lint: build ## Formatting, clippy, crate arrows, ruff, mypy, stubs: clean or failing
 	cargo fmt --all --check
 	cargo clippy --release --locked --workspace --all-targets -- -D warnings
+	cargo clippy --release --locked -p cloth-sim -p cloth-py --no-default-features --all-targets -- -D warnings
 	$(BIN)/python tools/check_arrows.py
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

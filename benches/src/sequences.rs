@@ -17,6 +17,8 @@ const RATE: f64 = 0.8;
 pub struct Sequence {
     /// Bodies in contact.
     pub mesh: CollisionMesh,
+    /// Positions with the cloth flat [m]: they shape the trees.
+    pub rest: Vec<Vec3>,
     position: Box<dyn Fn(f64) -> Vec<Vec3> + Send + Sync>,
 }
 
@@ -48,6 +50,10 @@ impl From<DetectError> for SequenceError {
     }
 }
 
+fn rest(cloth: &TriMesh, ball: &TriMesh) -> Vec<Vec3> {
+    cloth.vertices.iter().chain(&ball.vertices).copied().collect()
+}
+
 fn scene(cloth: &TriMesh, ball: &TriMesh) -> Result<CollisionMesh, DetectError> {
     CollisionMesh::new(&[
         (Body { dynamic: true, self_collision: true }, cloth.vertices.len(), &cloth.triangles),
@@ -62,7 +68,7 @@ fn scene(cloth: &TriMesh, ball: &TriMesh) -> Result<CollisionMesh, DetectError> 
 /// If `n` is too small for a mesh.
 pub fn spinning_ball(n: usize) -> Result<Sequence, SequenceError> {
     let (cloth, ball) = (generators::grid(1.8, 1.8, n, n)?, generators::sphere(RADIUS, 4)?);
-    let mesh = scene(&cloth, &ball)?;
+    let (mesh, rest) = (scene(&cloth, &ball)?, rest(&cloth, &ball));
     let bump = |direction: &Vec3, angle: f64| {
         let around = direction.z.atan2(direction.x) - angle;
         BUMP * (9.0 * around).sin() * (11.0 * direction.y).cos()
@@ -78,11 +84,11 @@ pub fn spinning_ball(n: usize) -> Result<Sequence, SequenceError> {
             let arc = (r / RADIUS).min(0.5 * PI);
             let hanging = (r - 0.5 * PI * RADIUS).max(0.0);
             let fold = (hanging / 0.2).min(1.0);
-            // Overhanging folds: they swing sideways as they swing out.
+            // Overhanging folds: between crest and trough they turn back.
             let folds = 14.0;
             let phase = folds * around + 0.8 * (3.0 * time).sin();
             let out = RADIUS * arc.sin() + 0.035 * fold * phase.sin() + 0.15 * hanging;
-            let sideways = around + fold * 1.1 / folds * (2.0 * phase).sin();
+            let sideways = around - fold * 0.8 / folds * (2.0 * phase).sin();
             let lag = angle - 0.25 * fold * (1.0 - (-time).exp());
             let on_ball = Vec3::new(arc.sin() * around.cos(), arc.cos(), arc.sin() * around.sin());
             let lift = BUMP * 0.2 + bump(&on_ball, angle - lag) * (1.0 - fold);
@@ -97,7 +103,7 @@ pub fn spinning_ball(n: usize) -> Result<Sequence, SequenceError> {
         });
         on_cloth.chain(on_ball).collect()
     };
-    Ok(Sequence { mesh, position: Box::new(position) })
+    Ok(Sequence { mesh, rest, position: Box::new(position) })
 }
 
 /// A cloth of n × n vertices, 2 m wide, that is folded in the middle and settles onto itself from 20 mm to 2 mm, with travelling
@@ -107,7 +113,7 @@ pub fn spinning_ball(n: usize) -> Result<Sequence, SequenceError> {
 /// If `n` is too small for a mesh.
 pub fn folding(n: usize) -> Result<Sequence, SequenceError> {
     let (cloth, ball) = (generators::grid(2.0, 2.0, n, n)?, generators::sphere(0.2, 3)?);
-    let mesh = scene(&cloth, &ball)?;
+    let (mesh, rest) = (scene(&cloth, &ball)?, rest(&cloth, &ball));
     let position = move |time: f64| {
         let gap = 0.002 + 0.018 * (-2.0 * time).exp();
         let on_cloth = cloth.vertices.iter().map(|p| {
@@ -127,5 +133,5 @@ pub fn folding(n: usize) -> Result<Sequence, SequenceError> {
         let on_ball = ball.vertices.iter().map(|p| p + Vec3::new(0.4, -0.22, 0.0));
         on_cloth.chain(on_ball).collect()
     };
-    Ok(Sequence { mesh, position: Box::new(position) })
+    Ok(Sequence { mesh, rest, position: Box::new(position) })
 }

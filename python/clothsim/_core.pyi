@@ -13,6 +13,7 @@ __all__ = [
     "BUILD_PROFILE",
     "Scene",
     "Simulation",
+    "SkippingSession",
     "__version__",
     "bending_laws",
     "bending_trace",
@@ -30,7 +31,10 @@ __all__ = [
     "friction_force",
     "friction_pairs",
     "friction_sources",
+    "gpu_adapters",
     "grid",
+    "let_auto_take_software",
+    "lose_gpu",
     "material_named",
     "material_names",
     "ribbon",
@@ -62,10 +66,14 @@ def detect(
     thickness: float,
     device: str,
     threads: int | None,
+    cell_factor: float | None,
 ) -> tuple[_Ints, _Floats, _Ints, _Floats, dict[str, Any], tuple[bool, str] | None]: ...
 def vertex_triangle_ccd(queries: _Floats, thickness: float) -> tuple[NDArray[np.bool_], _Floats]: ...
 def edge_edge_ccd(queries: _Floats, thickness: float) -> tuple[NDArray[np.bool_], _Floats]: ...
 def self_intersections(x: _Floats, triangles: _Ints, threads: int | None) -> _Ints: ...
+def gpu_adapters() -> tuple[str, str]: ...
+def lose_gpu() -> bool: ...
+def let_auto_take_software(takes: bool) -> None: ...
 def friction_force(
     model: str,
     normal_force: _Floats,
@@ -102,6 +110,29 @@ class Scene:
     def fail(self, key: str, expected: str, got: str) -> None: ...
 
 @final
+class SkippingSession:
+    def __new__(
+        cls,
+        triangles: _Ints,
+        bodies: list[tuple[int, bool, bool]] | None,
+        rest: _Floats | None,
+        variant: str,
+        frames: int | None,
+        alpha: float | None,
+        first_frames: int,
+        most_frames: int,
+        beta: float,
+        gamma: float,
+        adapt: str,
+        low_curvature: bool,
+        threads: int | None,
+    ) -> SkippingSession: ...
+    def detect(
+        self, x_t0: _Floats, x_t1: _Floats, thickness: float, mode: str
+    ) -> tuple[tuple[_Ints, _Floats, _Ints, _Floats], dict[str, Any]]: ...
+    def restart(self) -> None: ...
+
+@final
 class Simulation:
     def __new__(
         cls,
@@ -110,10 +141,11 @@ class Simulation:
         sequences: dict[str, tuple[_Floats, _Ints]],
         velocities: dict[str, _Floats],
         threads: int | None,
+        device: str,
         allow_intersections: bool,
     ) -> Simulation: ...
     @staticmethod
-    def resume(bytes: bytes, threads: int | None) -> Simulation: ...
+    def resume(bytes: bytes, threads: int | None, device: str) -> Simulation: ...
     def step(self) -> None: ...
     def advance(self, seconds: float) -> int: ...
     def finish_advance(self) -> int: ...
@@ -132,6 +164,7 @@ class Simulation:
     def energy(self) -> str: ...
     def plan(self) -> tuple[str, str]: ...
     def summary(self) -> str: ...
+    def fallbacks(self) -> str: ...
     def steps(self, first: int) -> str: ...
     def scene(self) -> str: ...
     def intersections(self) -> _Ints: ...

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import operator
 
-from clothsim.errors import GpuUnavailable, InvalidInput
+from clothsim.errors import InvalidInput
 
-__all__ = ["check_device", "check_threads"]
+__all__ = ["DEVICES", "check_device", "check_threads"]
 
 _MOST_THREADS = 65_536
 
 
+DEVICES = ("auto", "cpu", "gpu")
+
+
 def check_device(device: str) -> str:
-    """Return ``"cpu"`` for what a simulation can do; ``"auto"`` is the CPU too, as it is the only one."""
-    if device in ("cpu", "auto"):
-        return "cpu"
-    if device == "gpu":
-        raise GpuUnavailable('device: a simulation detects collisions on the CPU only; use "cpu" or "auto"')
-    raise InvalidInput(
-        f'device: expected one of "cpu", "auto", got {device!r}',
-        name="device",
-        expected='one of "cpu", "auto"',
-        got=repr(device),
-    )
+    """Refuse what is no name of a device."""
+    if device not in DEVICES:
+        expected = f"one of {', '.join(json.dumps(name) for name in DEVICES)}"
+        raise InvalidInput(
+            f"device: expected {expected}, got {device!r}", name="device", expected=expected, got=repr(device)
+        )
+    return device
 
 
 def check_threads(threads: int | None) -> int | None:

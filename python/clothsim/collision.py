@@ -3,52 +3,22 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from numpy.typing import ArrayLike, NDArray
 
 from clothsim import _core
 from clothsim._arrays import Floats, Ints, floats, indices, number
+from clothsim._detection import THICKNESS, Detection
 from clothsim._device import check_threads
+from clothsim._session import SkippingSession
 
-__all__ = ["Detection", "detect", "edge_edge_ccd", "self_intersections", "vertex_triangle_ccd"]
+__all__ = ["Detection", "SkippingSession", "detect", "edge_edge_ccd", "self_intersections", "vertex_triangle_ccd"]
 
-Method = Literal["brute", "bvh", "grid", "virtual-subdivision", "auto"]
+Method = Literal["brute", "bvh", "session", "grid", "virtual-subdivision", "octree-single", "octree", "auto"]
 Mode = Literal["continuous", "discrete"]
 
 _logger = logging.getLogger(__name__)
-
-_THICKNESS = "a finite length ≥ 0 m"
-
-
-@dataclass(frozen=True, eq=False)
-class Detection:
-    """Every pair in contact, each once and sorted.
-
-    Attributes
-    ----------
-    vertex_triangle : (k, 2) int64
-        Vertex, triangle.
-    time_vertex_triangle : (k,) float64
-        When they first are in contact, as a fraction of the step in [0, 1], never later than the true time.
-    edge_edge : (k, 4) int64
-        The vertices of the one edge, then of the other.
-    time_edge_edge : (k,) float64
-        As above.
-    stats : dict
-        ``method`` and ``device`` that found them (``"cpu"``, or the GPU with its driver), counts
-        (``broad_phase_tests``, ``candidates_vertex_triangle``, …) and ``seconds`` per stage.
-    """
-
-    vertex_triangle: Ints
-    time_vertex_triangle: Floats
-    edge_edge: Ints
-    time_edge_edge: Floats
-    stats: dict[str, Any]
-
-    def __repr__(self) -> str:
-        return f"Detection({len(self.vertex_triangle)} vertex-triangle, {len(self.edge_edge)} edge-edge)"
 
 
 def detect(
@@ -60,6 +30,8 @@ def detect(
     thickness: float = 0.0,
     device: str = "cpu",
     threads: int | None = None,
+    *,
+    cell_factor: float | None = None,
 ) -> Detection:
     """Find every vertex-triangle and edge-edge pair that shares no vertex and comes within ``thickness``.
 
@@ -72,9 +44,11 @@ def detect(
         Positions at both ends of the step [m].
     triangles : (m, 3) array of int32 or int64
         Vertex indices.
-    method : {"bvh", "brute", "grid", "virtual-subdivision", "auto"}
-        On the CPU: ``"bvh"``, a tree of boxes; ``"brute"``, every pair, the oracle, for small meshes. On a GPU:
-        ``"grid"``, a uniform grid; ``"virtual-subdivision"``, a finer one in which large triangles count in parts.
+    method : {"bvh", "brute", "session", "grid", "virtual-subdivision", "octree-single", "octree", "auto"}
+        On the CPU: ``"bvh"``, a tree of boxes; ``"brute"``, every pair, the oracle, for small meshes; ``"session"``,
+        for many frames (:class:`SkippingSession`), of one what ``"bvh"`` does. On a GPU: ``"grid"``, a uniform grid;
+        ``"virtual-subdivision"``, a finer one in which large triangles count in parts;
+        ``"octree-single"`` and ``"octree"``, adaptive octrees of one and two stages.
         ``"auto"``: ``"bvh"`` on the CPU, ``"virtual-subdivision"`` on a GPU.
     mode : {"continuous", "discrete"}
         The motion, or the end positions ``x_t1`` alone.
@@ -86,6 +60,9 @@ def detect(
         fails, ``"bvh"`` on the CPU, with the reason in the log (logger ``clothsim.collision``).
     threads : int, optional
         How many threads; all of the machine's by default.
+    cell_factor : float, optional
+        λ of ``"virtual-subdivision"`` (thesis Eq. 5.1), 0.1 to 100: cells are 3 λ times the average radius.
+        By default 1.2. The contacts do not depend on it.
 
     Returns
     -------
@@ -119,9 +96,10 @@ def detect(
         indices(triangles, "triangles"),
         str(method),
         str(mode),
-        number(thickness, "thickness", _THICKNESS),
+        number(thickness, "thickness", THICKNESS),
         str(device),
         check_threads(threads),
+        None if cell_factor is None else number(cell_factor, "cell_factor", "λ from 0.1 to 100"),
     )
     if fallback is not None:
         has_failed, reason = fallback
@@ -154,7 +132,7 @@ def vertex_triangle_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDA
     [False]
     """
     return _core.vertex_triangle_ccd(
-        floats(queries, "queries", "shape (n, 8, 3)"), number(thickness, "thickness", _THICKNESS)
+        floats(queries, "queries", "shape (n, 8, 3)"), number(thickness, "thickness", THICKNESS)
     )
 
 
@@ -175,9 +153,7 @@ def edge_edge_ccd(queries: ArrayLike, thickness: float = 0.0) -> tuple[NDArray[A
     time : (n,) float64
         Fraction of the step in [0, 1], never later than the true first time; infinity where there is no contact.
     """
-    return _core.edge_edge_ccd(
-        floats(queries, "queries", "shape (n, 8, 3)"), number(thickness, "thickness", _THICKNESS)
-    )
+    return _core.edge_edge_ccd(floats(queries, "queries", "shape (n, 8, 3)"), number(thickness, "thickness", THICKNESS))
 
 
 def self_intersections(x: ArrayLike, triangles: ArrayLike, *, threads: int | None = None) -> Ints:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import logging
 import math
 import os
 from collections.abc import Iterator
@@ -21,6 +23,8 @@ from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
 
 __all__ = ["Frame", "Hinges", "Plan", "Simulation", "record"]
+
+_logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,8 +111,11 @@ class Simulation:
         What to simulate.
     threads : int, optional
         How many threads; all of the machine's by default. Results do not depend on it.
-    device : {"auto", "cpu"}
-        Where to detect collisions.
+    device : {"auto", "cpu", "gpu"}
+        Where to detect collisions during a step, with the detector that the scene's ``contact.detector`` says; results
+        do not depend on it. ``"gpu"``: any Vulkan, Metal or DX12 adapter, a software adapter too. ``"auto"``: a GPU
+        that is no software adapter, else the CPU; if the GPU fails, the CPU goes on in mid-run, with a warning in the
+        log (logger ``clothsim.simulation``) and a note in `report`.
     allow_intersections : bool
         Run from a start with intersections, even if the scene does not say so.
 
@@ -118,6 +125,10 @@ class Simulation:
         A value or a mesh cannot be used; file, line and key are named.
     IntersectingStart
         Triangles pass through each other at the start; how many and which are named.
+    GpuUnavailable
+        ``device="gpu"``, and there is no adapter.
+    DeviceError
+        ``device="gpu"``, and it cannot be used.
     TypeError
         ``scene`` is no `Scene`.
 
@@ -142,14 +153,36 @@ class Simulation:
     ) -> None:
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
-        check_device(device)
-        self._core = _core.Simulation(scene.check(), *scene.assets(), check_threads(threads), bool(allow_intersections))
+        self._core = _core.Simulation(
+            scene.check(), *scene.assets(), check_threads(threads), check_device(device), bool(allow_intersections)
+        )
+        self._logged = 0
+        self._log_fallbacks()
 
     @classmethod
     def _over(cls, core: _core.Simulation) -> Simulation:
         simulation = cls.__new__(cls)
         simulation._core = core
+        simulation._logged = sum(f["step"] < core.step_count for f in json.loads(core.fallbacks()))
+        simulation._log_fallbacks()
         return simulation
+
+    def _log_fallbacks(self) -> None:
+        """Say once of each GPU that is done without since when, and why."""
+        fallbacks = json.loads(self._core.fallbacks())
+        for f in fallbacks[self._logged :]:
+            _logger.warning(
+                'detector "%s": on the CPU instead of a GPU since step %d: %s: %s',
+                *(f[key] for key in ("detector", "step", "device", "reason")),
+            )
+        self._logged = len(fallbacks)
+
+    @contextlib.contextmanager
+    def _stepping(self) -> Iterator[None]:
+        try:
+            yield
+        finally:
+            self._log_fallbacks()
 
     # Stepping --------------------------------------------------------------------------------------------------
 
@@ -160,8 +193,11 @@ class Simulation:
         ------
         SimulationDiverged, SimulationStuck
             The step failed at every size tried; the state is the last good one.
+        DeviceError
+            ``device="gpu"``, and it gave no answer; the state is the last good one, and the next step asks it again.
         """
-        self._core.step()
+        with self._stepping():
+            self._core.step()
         last: dict[str, Any] = json.loads(self._core.steps(self._step_reports() - 1))[0]
         return last
 
@@ -172,14 +208,18 @@ class Simulation:
         ------
         SimulationDiverged, SimulationStuck
             A step failed at every size tried; the state is the last good one.
+        DeviceError
+            ``device="gpu"``, and it gave no answer; the state is the last good one. `finish_advance` does the rest.
         KeyboardInterrupt
             Between two steps; `finish_advance` (also after a checkpoint) does the rest with the same steps.
         """
-        self._core.advance(number(seconds, "seconds", "a finite number ≥ 0 [s]"))
+        with self._stepping():
+            self._core.advance(number(seconds, "seconds", "a finite number ≥ 0 [s]"))
 
     def finish_advance(self) -> None:
         """Do what an interrupted `advance` has left, to the same bits as without the interruption."""
-        self._core.finish_advance()
+        with self._stepping():
+            self._core.finish_advance()
 
     def run(self, seconds: float | None = None, fps: float = 60.0, progress: bool = True) -> Iterator[Frame]:
         """Yield the state now and then ``fps`` times per simulated second.
@@ -307,6 +347,7 @@ class Simulation:
     def report(self) -> dict[str, Any]:
         """What happened so far: ``steps`` (one table each), ``totals``, ``effects`` with their cost, ``threads``.
 
+        ``detection`` says which detector runs where and why, ``fallbacks`` which GPUs were done without since when.
         ``left_out`` counts the first steps that a checkpoint had no tables of; ``totals`` and ``effects`` have them.
         """
         report: dict[str, Any] = json.loads(self._core.summary())
@@ -332,23 +373,27 @@ class Simulation:
         write_whole(Path(path), self._core.checkpoint(0 if steps else self._step_reports()))
 
     @classmethod
-    def resume(cls, path: str | os.PathLike[str], threads: int | None = None) -> Simulation:
+    def resume(cls, path: str | os.PathLike[str], threads: int | None = None, device: str = "auto") -> Simulation:
         """Go on from a checkpoint, to the same bits as if the run had not been interrupted.
+
+        ``threads`` and ``device`` may be others than before, as for `Simulation`.
 
         Raises
         ------
         CheckpointError
             The file cannot be read, is no checkpoint, of another version, cut off or damaged.
+        DeviceError
+            As for `Simulation`.
         """
         try:
             content = Path(path).read_bytes()
         except OSError as error:
             raise CheckpointError(f"{path}: cannot read the checkpoint: {error.strerror or error}") from error
-        return cls._from_bytes(content, threads)
+        return cls._from_bytes(content, threads, device)
 
     @classmethod
-    def _from_bytes(cls, content: bytes, threads: int | None) -> Simulation:
-        return cls._over(_core.Simulation.resume(content, check_threads(threads)))
+    def _from_bytes(cls, content: bytes, threads: int | None, device: str) -> Simulation:
+        return cls._over(_core.Simulation.resume(content, check_threads(threads), check_device(device)))
 
     def __repr__(self) -> str:
         cloth = sum(b.vertex_count for b in self.bodies if b.kind == "cloth")

@@ -68,13 +68,13 @@ def test_input_is_borrowed_not_changed() -> None:
     [
         (
             {"method": "grid"},
-            r'method: expected one that runs on device "cpu" \("brute", "bvh" run on "cpu", '
-            r'"grid", "virtual-subdivision" on "gpu"\), '
+            r'method: expected one that runs on device "cpu" \("brute", "bvh", "session" run on "cpu", '
+            r'"grid", "virtual-subdivision", "octree-single", "octree" on "gpu"\), '
             'got "grid"',
         ),
         ({"method": "virtual-subdivision"}, 'that runs on device "cpu"'),
         ({"method": "bvh", "device": "gpu"}, 'that runs on device "gpu"'),
-        ({"method": "gird"}, '"grid", "virtual-subdivision", "auto", got "gird" .did you mean "grid"'),
+        ({"method": "gird"}, '"octree-single", "octree", "auto", got "gird" .did you mean "grid"'),
         ({"method": "octopus"}, '"auto", got "octopus"$'),
         ({"mode": "swept"}, 'mode: expected one of "continuous", "discrete", got "swept"'),
         ({"thickness": -1e-3}, "thickness: expected a finite length ≥ 0 m, got -0.001"),

@@ -14,7 +14,7 @@ import pytest
 
 import clothsim as cs
 
-METHODS = ["grid", "virtual-subdivision"]
+METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
 
 
@@ -65,7 +65,7 @@ def test_threads_that_call_at_once_all_get_the_contacts(gpu: str) -> None:
     found: dict[int, cs.collision.Detection] = {}
 
     def work(k: int) -> None:
-        found[k] = cs.collision.detect(*frames[k], METHODS[k % 2], device="gpu", threads=1)
+        found[k] = cs.collision.detect(*frames[k], METHODS[k], device="gpu", threads=1)
 
     workers = [threading.Thread(target=work, args=(k,)) for k in range(len(frames))]
     for worker in workers:
@@ -75,6 +75,32 @@ def test_threads_that_call_at_once_all_get_the_contacts(gpu: str) -> None:
     for k, contacts in enumerate(expected):
         for name in ARRAYS:
             np.testing.assert_array_equal(getattr(found[k], name), getattr(contacts, name))
+
+
+def test_cell_factor_changes_the_counts_and_not_the_contacts(gpu: str) -> None:
+    frames = soup(3, 600)
+    expected = cs.collision.detect(*frames)
+    tests: list[int] = []
+    for cell_factor in (None, 1.2, 1.0, 2.0, 5.0):
+        found = cs.collision.detect(*frames, "virtual-subdivision", device="gpu", cell_factor=cell_factor)
+        for name in ARRAYS:
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+        tests.append(found.stats["broad_phase_tests"])
+        assert found.stats["registrations"] >= found.stats["parts"] >= len(frames[2])
+        assert found.stats["bytes"] > 0
+    assert tests[0] == tests[1], "1.2 by default"
+    assert len(set(tests[1:])) == len(tests) - 1, tests
+
+
+def test_a_mesh_that_stays_on_the_gpu_is_not_taken_for_another(gpu: str) -> None:
+    """Calls for one mesh share its upload; calls in between for others, of the same size, get their own."""
+    x_t0, x_t1, triangles = soup(4, 60)
+    turned = np.roll(triangles, 7, axis=0)
+    for faces in (triangles, triangles, turned, triangles, np.flip(triangles, axis=0), turned, turned):
+        found = cs.collision.detect(x_t0, x_t1, faces, "grid", thickness=0.05, device="gpu")
+        expected = cs.collision.detect(x_t0, x_t1, faces, thickness=0.05)
+        for name in ARRAYS:
+            np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -94,6 +120,11 @@ def test_no_triangles_have_no_contacts(gpu: str, method: str) -> None:
         ({"thickness": -1.0}, "thickness: expected a finite length"),
         ({"method": "virtual-subdivison"}, 'did you mean "virtual-subdivision"'),
         ({"method": "brute"}, 'that runs on device "gpu".*got "brute"'),
+        ({"cell_factor": 0.05}, "cell_factor: expected λ from 0.1 to 100, got 0.05"),
+        ({"cell_factor": float("nan")}, "cell_factor: expected λ from 0.1 to 100, got NaN"),
+        ({"cell_factor": 1.2}, 'cell_factor: expected nothing, as only the method "virtual-subdivision" has it'),
+        ({"cell_factor": 1.2, "method": "auto"}, 'got a value for "auto"'),
+        ({"cell_factor": "wide"}, "cell_factor: expected λ from 0.1 to 100, got 'wide'"),
         ({"device": "gpus"}, 'device: expected one of "cpu", "gpu", "auto", got "gpus" .did you mean "gpu"'),
     ],
 )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import os
 import pkgutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -93,3 +96,48 @@ def test_the_example_in_the_readme_runs(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "lowest point" in done.stdout
+
+
+def test_the_examples_on_gpus_run(tmp_path: Path) -> None:
+    """The Python blocks as they stand, and the options of the commands."""
+    text = (ROOT / "docs" / "gpu.md").read_text()
+    blocks = [part.split("```")[0] for part in text.split("```python\n")[1:]]
+    assert len(blocks) == 2
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1], [0.2, 0.1, 0.2], [1.2, 1, 0.2], [0.2, 1, 1.2]])
+    scene = cs.Scene(contact={"thickness": 0.01}, duration=0.1)
+    scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton")
+    names: dict[str, Any] = {
+        "cs": cs,
+        "x_t0": x,
+        "x_t1": x - [0, 0.2, 0],
+        "triangles": [[0, 1, 2], [3, 4, 5]],
+        "scene": scene,
+    }
+    try:
+        for block in blocks:
+            exec(block, names)
+    except cs.GpuUnavailable as reason:
+        if os.environ.get("CLOTHSIM_REQUIRE_GPU") == "1":
+            pytest.fail(f"CLOTHSIM_REQUIRE_GPU=1, but {reason}")
+        pytest.skip(str(reason))
+    assert names["sim"].report["detection"].keys() == {"detector", "device", "why", "device_bytes"}
+    commands = text.split("```sh\n")[1].split("```")[0].splitlines()
+    for command in commands:
+        line = command.replace("clothsim ", "", 1).replace("out/drape", str(tmp_path / "out")).split()
+        line += ["--frames", "1", "--quiet"] if line[0] == "run" else []
+        done = subprocess.run(
+            [sys.executable, "-m", "clothsim", *line], cwd=ROOT, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+
+
+def test_the_table_of_methods_has_every_method() -> None:
+    """A detector that is added is in the documentation, the schema and the error that lists them."""
+    with pytest.raises(cs.InvalidInput) as caught:
+        cs.collision.detect(np.eye(3), np.eye(3), [[0, 1, 2]], "none")
+    known = set(caught.value.expected.removeprefix("one of ").split(" (")[0].replace('"', "").split(", "))
+    table = (ROOT / "docs" / "gpu.md").read_text().split("|---|---|---|\n")[1].split("\n\n")[0]
+    listed = {name for row in table.splitlines() for name in row.split("|")[1].replace("`", "").split('"')[1::2]}
+    assert listed == known
+    schema = (ROOT / "docs" / "scene.schema.json").read_text()
+    assert all(f'\\"{name}\\"' in schema for name in known)

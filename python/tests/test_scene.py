@@ -72,7 +72,7 @@ BAD_KEYS: list[tuple[dict[str, Any], str]] = [
     ({"gravity": [0, -9.81]}, "gravity: expected an array of 3"),
     ({"gravity": [0, np.inf, 0]}, r"gravity\[1\]: expected a finite number, got inf"),
     ({"contact": {"thickness": -0.001}}, r"contact\.thickness: expected .*> 0.*got -0\.001"),
-    ({"contact": {"detector": "grid"}}, r"contact\.detector: .*bvh"),
+    ({"contact": {"detector": "gird"}}, r"contact\.detector: .*bvh.*did you mean \"grid\""),
     ({"contact": {"friction": -1.0}}, r"contact\.friction"),
     ({"output": {"fps": 0}}, r"output\.fps"),
     ({"cloth": [cloth(material="coton")]}, r"cloth\[0\]\.material: .*did you mean \"cotton\""),

@@ -1,6 +1,7 @@
 //! Detection over coherent sequences by every variant of the session, frame by frame in turn: seconds per stage and counts.
 //!
-//! `cargo run --release -p cloth-collision --example session -- [vertices per side] [frames] [thickness in mm] [threads]`
+//! `cargo run --release -p cloth-collision --example session -- [vertices per side] [frames] [thickness in mm] [threads]
+//! [variant]`; with a variant alone, a profiler counts what that one does.
 
 #![allow(clippy::unwrap_used, reason = "a measurement that cannot start has nothing to report")]
 #![allow(clippy::print_stdout, reason = "the table is its result")]
@@ -66,14 +67,16 @@ fn measure(name: &str, sequence: &Sequence, frames: u32, thickness: f64, threads
         ("a7f8", fixed(8)),
         ("a15f16", fixed(16)),
         ("SwD", SessionOptions::default()),
-        ("SwD curved", SessionOptions { low_curvature: false, ..SessionOptions::default() }),
+        ("curved", SessionOptions { low_curvature: false, ..SessionOptions::default() }),
     ];
-    let x = sequence.at(0);
+    let only = std::env::args().nth(5);
+    let rows: Vec<_> = rows.into_iter().filter(|r| only.as_ref().is_none_or(|name| name == r.0)).collect();
+    let x = sequence.rest.clone();
     let mesh = &sequence.mesh;
     let mut sessions: Vec<SkippingSession> =
         rows.iter().map(|r| SkippingSession::new(mesh, &x, r.1).unwrap()).collect();
     let mut sums: Vec<Sum> = rows.iter().map(|_| Sum::default()).collect();
-    let mut x_t0 = x;
+    let mut x_t0 = sequence.at(0);
     for frame in 0..frames {
         let x_t1 = sequence.at(frame + 1);
         let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode: Mode::Continuous, active: None };

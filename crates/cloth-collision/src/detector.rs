@@ -1,13 +1,21 @@
 //! The contract of every detection method, and their names.
 
-use crate::{BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Query, Vec3};
+use crate::{
+    BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Query, SessionOptions, SkippingSession, Vec3,
+};
 
-const KNOWN: &str = "\"brute\", \"bvh\"";
+const KNOWN: &str = "\"brute\", \"bvh\", \"session\"";
 
 /// Finds every admissible pair in contact; see the crate's head for the contract.
 pub trait Detector: Send {
     /// The method's name, as [`detector`] takes it.
     fn name(&self) -> &'static str;
+
+    /// Whether a query with few active vertices takes less than one of all. Where it does not, a caller that looks again at a few may
+    /// ask [`Bvh`] instead: the answer is the same.
+    fn narrows(&self) -> bool {
+        true
+    }
 
     /// All contacts of the query: unique, sorted, the same bits for any number of threads.
     ///
@@ -29,6 +37,7 @@ pub fn detector(name: &str, mesh: &CollisionMesh, x: &[Vec3]) -> Result<Box<dyn 
     match name {
         "brute" => Ok(Box::new(BruteForce)),
         "bvh" => Ok(Box::new(Bvh::new(mesh, x)?)),
+        "session" => Ok(Box::new(SkippingSession::new(mesh, x, SessionOptions::default())?)),
         _ => Err(DetectError::UnknownDetector { known: KNOWN, got: name.to_owned() }),
     }
 }

@@ -4,10 +4,10 @@
 mod support;
 
 use cloth_collision::{
-    Adapt, BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Detector, FrameKind, Frames, Mode, Query,
+    Adapt, BruteForce, Bvh, CollisionMesh, Contacts, Detector, FrameKind, Frames, Mode, Query,
     SessionOptions, SkippingSession, Variant, Vec3,
 };
-use support::{Random, bodies, pool, sheet, soup};
+use support::{Random, along, bodies, layers, pool, sheet, soup, waves};
 
 /// None if equal, else what differs.
 fn difference(a: &Contacts, b: &Contacts) -> Option<&'static str> {
@@ -52,6 +52,7 @@ struct Seen {
     dangling: u64,
     one_by_one: usize,
     all_at_once: usize,
+    flat: u64,
 }
 
 impl Seen {
@@ -63,6 +64,7 @@ impl Seen {
             FrameKind::Skipping => self.skipping += 1,
         }
         self.dangling += stats.dangling_triangles;
+        self.flat += stats.flat_triangles;
         if stats.dangling_vertices > 0 {
             self.one_by_one += usize::from(stats.one_by_one);
             self.all_at_once += usize::from(!stats.one_by_one);
@@ -72,10 +74,21 @@ impl Seen {
 
 /// Every variant against the oracle over a sequence of (x_t0, x_t1).
 fn compare(mesh: &CollisionMesh, frames: &[[Vec<Vec3>; 2]], small: bool, what: &str) -> Seen {
+    compare_from(mesh, &frames[0][0], frames, small, what)
+}
+
+/// [`compare`] with trees in the shape of `x`.
+fn compare_from(
+    mesh: &CollisionMesh,
+    x: &[Vec3],
+    frames: &[[Vec<Vec3>; 2]],
+    small: bool,
+    what: &str,
+) -> Seen {
     let (one, two) = (pool(1), pool(2));
     let mut seen = Seen::default();
     for (thickness, mode) in [(0.0, Mode::Continuous), (0.02, Mode::Continuous), (0.02, Mode::Discrete)] {
-        let mut bvh = Bvh::new(mesh, &frames[0][0]).unwrap();
+        let mut bvh = Bvh::new(mesh, x).unwrap();
         let expected: Vec<Contacts> = frames
             .iter()
             .map(|[x_t0, x_t1]| {
@@ -88,7 +101,7 @@ fn compare(mesh: &CollisionMesh, frames: &[[Vec<Vec3>; 2]], small: bool, what: &
             })
             .collect();
         for options in variants() {
-            let mut session = SkippingSession::new(mesh, &frames[0][0], options).unwrap();
+            let mut session = SkippingSession::new(mesh, x, options).unwrap();
             for (k, [x_t0, x_t1]) in frames.iter().enumerate() {
                 let query = Query { x_t0, x_t1, thickness, mode, active: None };
                 let got = session.detect(mesh, &query, if k % 2 == 0 { &one } else { &two }).unwrap();
@@ -106,42 +119,13 @@ fn compare(mesh: &CollisionMesh, frames: &[[Vec<Vec3>; 2]], small: bool, what: &
     seen
 }
 
-/// Frames along a path, each step starting where the last one ended.
-fn along(count: usize, position: impl Fn(usize) -> Vec<Vec3>) -> Vec<[Vec<Vec3>; 2]> {
-    (0..count).map(|k| [position(k), position(k + 1)]).collect()
-}
-
-/// Two sheets of unit size, one above the other; the upper one rests on the lower one's waves.
-fn layers(n: usize, random: &mut Random) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-    let (mut x, mut triangles) = sheet(n, random);
-    let (count, lower) = (x.len() as u32, triangles.clone());
-    x.extend_from_within(..);
-    for v in &mut x[count as usize..] {
-        v.y += 0.015;
-        v.x += 0.3 / n as f64;
-    }
-    triangles.extend(lower.iter().map(|t| t.map(|v| v + count)));
-    (x, triangles)
-}
-
-/// A coherent motion: waves that travel through the layers, and a slow drift.
-fn waves(x: &[Vec3], speed: f64) -> impl Fn(usize) -> Vec<Vec3> + '_ {
-    move |k| {
-        let time = speed * k as f64;
-        let wave = |p: &Vec3| {
-            Vec3::new(0.2 * time, 0.01 * (9.0 * p.x + 40.0 * time).sin() * (7.0 * p.z).cos(), 0.1 * time)
-        };
-        x.iter().enumerate().map(|(v, p)| p + wave(p) * if v % 2 == 0 { 1.0 } else { 1.1 }).collect()
-    }
-}
-
 #[test]
 fn coherent_motion_agrees_with_brute_force() {
     let mut random = Random(11);
     let (x, triangles) = layers(9, &mut random);
     let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
     let seen = compare(&mesh, &along(14, waves(&x, 0.002)), true, "waves");
-    assert!(seen.contacts > 1000 && seen.skipping > 150 && seen.first > 50, "{seen:?}");
+    assert!(seen.contacts > 1000 && seen.skipping > 80 && seen.first > 40, "{seen:?}");
 }
 
 #[test]
@@ -150,7 +134,32 @@ fn coherent_motion_agrees_with_the_tree() {
     let (x, triangles) = layers(28, &mut random);
     let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
     let seen = compare(&mesh, &along(16, waves(&x, 0.0005)), false, "waves");
-    assert!(seen.contacts > 10_000 && seen.skipping > 200, "{seen:?}");
+    assert!(seen.contacts > 10_000 && seen.skipping > 100, "{seen:?}");
+}
+
+/// A sheet whose right half turns over onto the left one, with waves.
+fn folding(x: &[Vec3], k: usize, speed: f64) -> Vec<Vec3> {
+    let angle = (3.06 + speed * k as f64).min(3.13);
+    let fold = |p: &Vec3| {
+        let (wave, side) =
+            (0.01 * (20.0 * p.x + 2.0 * k as f64 * speed).sin() * (15.0 * p.z).cos(), p.x - 0.5);
+        if side < 0.0 {
+            Vec3::new(-side, wave, p.z)
+        } else {
+            Vec3::new(-side * angle.cos(), side * angle.sin() - wave * angle.cos(), p.z)
+        }
+    };
+    x.iter().map(fold).collect()
+}
+
+#[test]
+fn folding_cloth_agrees_with_its_flat_parts_left_out() {
+    for (seed, n, small) in [(21, 26, true), (22, 40, false)] {
+        let (x, triangles) = sheet(n, &mut Random(seed));
+        let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
+        let seen = compare_from(&mesh, &x, &along(7, |k| folding(&x, k, 0.005)), small, "folding");
+        assert!(seen.flat > 5_000 && seen.contacts > 100, "{seen:?}");
+    }
 }
 
 #[test]
@@ -322,64 +331,4 @@ fn planted_faults_are_noticed() {
     let mut bad = good.clone();
     bad.time_edge_edge[0] += 1e-12;
     assert_eq!(difference(&good, &bad), Some("times"));
-}
-
-#[test]
-fn bad_input_is_named() {
-    let x = vec![Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()];
-    let mesh = CollisionMesh::single(4, &[[0, 1, 2], [1, 2, 3]]).unwrap();
-    let refused = |options: SessionOptions| match SkippingSession::new(&mesh, &x, options) {
-        Err(DetectError::Parameter { parameter, .. }) => parameter,
-        other => panic!("{other:?}"),
-    };
-    assert_eq!(refused(fixed(0)), "frames");
-    assert_eq!(refused(fixed(1001)), "frames");
-    let adaptive = |first, most| SessionOptions { frames: Frames::Adaptive { first, most }, ..fixed(1) };
-    assert_eq!(refused(adaptive(9, 8)), "frames");
-    assert_eq!(refused(adaptive(1, 0)), "frames");
-    let alpha = Frames::Fixed { frames: 2, alpha: Some(f64::NAN) };
-    assert_eq!(refused(SessionOptions { frames: alpha, ..fixed(1) }), "alpha");
-    assert_eq!(refused(SessionOptions { beta: -0.1, ..fixed(1) }), "beta");
-    assert_eq!(refused(SessionOptions { gamma: f64::INFINITY, ..fixed(1) }), "gamma");
-
-    let mut session = SkippingSession::new(&mesh, &x, fixed(5)).unwrap();
-    let query = Query { x_t0: &x, x_t1: &x, thickness: 0.0, mode: Mode::Continuous, active: None };
-    session.detect(&mesh, &query, &pool(1)).unwrap();
-    // A NaN inside a session is refused, and the session goes on.
-    let mut y = x.clone();
-    y[1].y = f64::NAN;
-    assert!(matches!(
-        session.detect(&mesh, &Query { x_t1: &y, ..query }, &pool(1)),
-        Err(DetectError::NotFinite { array: "x_t1", vertex: 1, .. })
-    ));
-    let other = CollisionMesh::single(4, &[[0, 1, 2], [1, 3, 2]]).unwrap();
-    assert_eq!(
-        session.detect(&other, &query, &pool(1)).unwrap_err(),
-        DetectError::ChangedTopology { triangle: 1 }
-    );
-    let fewer = CollisionMesh::single(4, &[[0, 1, 2]]).unwrap();
-    assert!(matches!(session.detect(&fewer, &query, &pool(1)), Err(DetectError::OtherMesh { .. })));
-    let mut still = mesh.clone();
-    still.bodies[0].self_collision = false;
-    assert_eq!(session.detect(&still, &query, &pool(1)).unwrap_err(), DetectError::ChangedBodies);
-    session.detect(&mesh, &query, &pool(1)).unwrap();
-    assert_eq!(session.stats().kind, FrameKind::Skipping);
-}
-
-#[test]
-fn a_stored_pair_takes_at_most_48_bytes() {
-    let mut random = Random(19);
-    let (x, triangles) = layers(50, &mut random);
-    let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
-    let mut session = SkippingSession::new(&mesh, &x, fixed(20)).unwrap();
-    for (k, [x_t0, x_t1]) in along(20, waves(&x, 0.0003)).iter().enumerate() {
-        let mut x_t1 = x_t1.clone();
-        (0..k).for_each(|_| x_t1[random.below(x.len())] += random.vector(0.02));
-        let query = Query { x_t0, x_t1: &x_t1, thickness: 0.01, mode: Mode::Continuous, active: None };
-        session.detect(&mesh, &query, &pool(1)).unwrap();
-        let stats = session.stats();
-        assert!(stats.pending > 10_000, "{stats:?}");
-        assert!(stats.pair_bytes <= 48 * stats.pending, "{stats:?}");
-        assert!(stats.pair_bytes >= 12 * stats.pending, "{stats:?}");
-    }
 }

@@ -66,11 +66,12 @@ struct Entry {
     centre: vec3<f32>,
     radius: f32,
     triangle: u32,
-    // See control.wgsl.
+    // See control.wgsl; of an octree the lowest cell of the base level that the triangle meets.
     control: u32,
-    // 2 · cell, plus 1 where that is not the home.
+    // 2 · cell, plus 1 where that is not the home; of an octree 2 · the leaf's lowest cell of the base level.
     key: u32,
-    pad: u32,
+    // Of an octree: levels of the leaf above the base | base << 8.
+    level: u32,
 }
 
 // What is asked of the virtual subdivision.
@@ -85,4 +86,26 @@ struct SubdivisionParams {
     least: f32,
     high: vec3<f32>,
     pad: u32,
+}
+
+// What is asked of the octree.
+struct OctreeParams {
+    // Lower corner of the root.
+    low: vec3<f32>,
+    triangles: u32,
+    // Cells of the base level per unit of length.
+    inverse: vec3<f32>,
+    // Finest level, coarsest level, level of the pages: see octree.wgsl.
+    base: u32,
+    top: u32,
+    page: u32,
+    // Visits of triangles to pages there is room for.
+    room: u32,
+    // 1: two-stage; 0: single-stage.
+    two_stage: u32,
+    // The level that octree_merge works on.
+    level: u32,
+    pad_0: u32,
+    pad_1: u32,
+    pad_2: u32,
 }

@@ -6,7 +6,7 @@
 //        entries[r]             by cell; bounds[t]
 //   out  pairs[p]       p < status[STATUS_TRIANGLE_PAIRS]: unordered; what does not fit is counted and left out
 //        status         also: registrations and tests there are
-// Includes: layout, boxes, control.   Twin: src/twin/pairs.rs
+// Includes: layout, boxes, control or octree_token (TOKEN).   Twin: src/twin/pairs.rs
 @group(0) @binding(0) var<uniform> params: PairParams;
 @group(0) @binding(1) var<storage, read> lengths: array<u32>;
 @group(0) @binding(2) var<storage, read> sums: array<vec2<u32>>;
@@ -83,11 +83,18 @@ fn spheres_touch(pair: vec2<u32>) -> bool {
     return dot(between, between) <= reach * reach * 1.00001;
 }
 
+//#if TOKEN
+fn is_here(pair: vec2<u32>) -> bool {
+    return holds_token(entries[pair.x], entries[pair.y]);
+}
+//#end
+//#if !TOKEN
 // Whether the pair is tested in this cell and not in the home of the second.
 fn is_here(pair: vec2<u32>) -> bool {
     return (entries[pair.y].key & 1u) == 0u
         || !is_left_to_other_cell(entries[pair.x].control, entries[pair.y].control);
 }
+//#end
 
 fn boxes_touch(a: u32, b: u32) -> bool {
     let first = bounds[a];

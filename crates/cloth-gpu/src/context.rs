@@ -1,26 +1,14 @@
 //! The device: which adapter, what it allows, what went wrong with it.
 
+use crate::adapters::{AdapterChoice, best, check_limits, description};
 use crate::error::GpuError;
 use crate::kernel::Kernel;
-use crate::limits::WORKGROUP;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::pin::pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Waker};
 use std::time::Duration;
-
-/// Which adapters will do.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum AdapterChoice {
-    /// A GPU if there is one (discrete before integrated before virtual), else a software adapter.
-    #[default]
-    Any,
-    /// GPUs only.
-    Hardware,
-    /// Software adapters only.
-    Software,
-}
 
 /// How to open a device.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -106,25 +94,7 @@ impl Gpu {
     }
 
     fn open(options: GpuOptions) -> Result<Self, GpuError> {
-        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-        descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-        let backends = descriptor.backends;
-        let instance = wgpu::Instance::new(descriptor);
-        let adapters = ready(instance.enumerate_adapters(backends)).unwrap_or_default();
-        let found = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
-        let adapter = adapters
-            .into_iter()
-            .filter(|a| rank(a, options.adapter).is_some())
-            .min_by_key(|a| rank(a, options.adapter))
-            .ok_or(GpuError::NoAdapter {
-                wanted: match options.adapter {
-                    AdapterChoice::Any => "any",
-                    AdapterChoice::Hardware => "a GPU",
-                    AdapterChoice::Software => "a software adapter",
-                },
-                found: if found.is_empty() { "none".to_owned() } else { found },
-            })?;
-
+        let adapter = best(options.adapter)?;
         let info = adapter.get_info();
         let limits = adapter.limits();
         check_limits(&limits)?;
@@ -182,8 +152,7 @@ impl Gpu {
 
     /// Adapter, driver and back end, for reports.
     pub fn description(&self) -> String {
-        let wgpu::AdapterInfo { name, driver, driver_info, backend, .. } = &self.info;
-        format!("{name} ({driver} {driver_info}, {backend})")
+        description(&self.info)
     }
 
     /// Whether the device is a processor that plays a GPU.
@@ -257,41 +226,6 @@ impl Gpu {
             }
         }
     }
-}
-
-/// The lower the better; None: not wanted.
-fn rank(adapter: &wgpu::Adapter, choice: AdapterChoice) -> Option<u32> {
-    let kind = adapter.get_info().device_type;
-    let is_software = kind == wgpu::DeviceType::Cpu;
-    match choice {
-        AdapterChoice::Hardware if is_software => return None,
-        AdapterChoice::Software if !is_software => return None,
-        _ => {}
-    }
-    Some(match kind {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    })
-}
-
-/// What every kernel takes for granted.
-fn check_limits(limits: &wgpu::Limits) -> Result<(), GpuError> {
-    let needs = [
-        ("max_compute_invocations_per_workgroup", WORKGROUP, limits.max_compute_invocations_per_workgroup),
-        ("max_compute_workgroup_size_x", WORKGROUP, limits.max_compute_workgroup_size_x),
-        ("max_compute_workgroup_storage_size", 16_384, limits.max_compute_workgroup_storage_size),
-        ("max_storage_buffers_per_shader_stage", 8, limits.max_storage_buffers_per_shader_stage),
-        ("max_compute_workgroups_per_dimension", 65_535, limits.max_compute_workgroups_per_dimension),
-    ];
-    for (what, needed, available) in needs {
-        if available < needed {
-            return Err(GpuError::Limit { what, needed: needed.into(), available: available.into() });
-        }
-    }
-    Ok(())
 }
 
 /// The outcome of a future of wgpu that is ready at once, as all are off the web.

@@ -65,6 +65,13 @@ impl Frame {
     }
 }
 
+impl Frame {
+    /// Largest radius of a position.
+    pub fn reach(&self) -> f32 {
+        self.positions.iter().fold(0.0, |r, p| r.max(p[3]))
+    }
+}
+
 fn position(x: &Vec3, origin: &Vec3, scale: f64, margin: f64) -> [f32; 4] {
     let mut out = [0.0; 4];
     let mut radius = 0.0f64;

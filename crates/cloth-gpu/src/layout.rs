@@ -106,12 +106,12 @@ pub struct Entry {
     pub radius: f32,
     /// The triangle.
     pub triangle: u32,
-    /// Its control bits: see `control.wgsl`.
+    /// Its control bits: see `control.wgsl`; of an octree the lowest cell of the base level that the triangle meets.
     pub control: u32,
-    /// 2 · cell, plus 1 where that is not the home.
+    /// 2 · cell, plus 1 where that is not the home; of an octree 2 · the leaf's lowest cell of the base level.
     pub key: u32,
-    /// Unused.
-    pub pad: u32,
+    /// Of an octree: levels of the leaf above the base | base << 8.
+    pub level: u32,
 }
 
 /// What is asked of the virtual subdivision.
@@ -134,4 +134,34 @@ pub struct SubdivisionParams {
     pub high: [f32; 3],
     /// Unused.
     pub pad: u32,
+}
+
+/// What is asked of the octree.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct OctreeParams {
+    /// Lower corner of the root.
+    pub low: [f32; 3],
+    /// Number of triangles.
+    pub triangles: u32,
+    /// Cells of the base level per unit of length.
+    pub inverse: [f32; 3],
+    /// Finest level.
+    pub base: u32,
+    /// Coarsest level.
+    pub top: u32,
+    /// Level of the pages: see `octree.wgsl`.
+    pub page: u32,
+    /// Visits of triangles to pages there is room for.
+    pub room: u32,
+    /// 1: two-stage; 0: single-stage.
+    pub two_stage: u32,
+    /// The level that `octree_merge` works on.
+    pub level: u32,
+    /// Unused.
+    pub pad_0: u32,
+    /// Unused.
+    pub pad_1: u32,
+    /// Unused.
+    pub pad_2: u32,
 }

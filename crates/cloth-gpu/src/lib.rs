@@ -17,16 +17,20 @@ pub mod limits;
 pub mod stages;
 pub mod twin;
 
+mod adapters;
 mod buffers;
 mod context;
 mod error;
 mod frame;
 mod grid;
+mod octree;
 mod recorder;
 
+pub use adapters::{Adapter, AdapterChoice, adapters};
 pub use buffers::{Array, Length};
-pub use context::{AdapterChoice, Gpu, GpuOptions};
+pub use context::{Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
 pub use grid::{GridGpu, GridOptions};
+pub use octree::{Levels, OctreeCounts, OctreeGpu, OctreeOptions, Thresholds};
 pub use recorder::{Answer, Recorder};

@@ -1,6 +1,6 @@
 //! Sizes that kernels, wrappers and twins share: written here once, injected into every kernel as its prelude.
 
-/// Invocations per workgroup, of every kernel.
+/// Invocations per workgroup, of every kernel but `octree_pages`.
 pub const WORKGROUP: u32 = 256;
 /// Elements that one invocation scans.
 pub const SCAN_ITEMS: u32 = 8;
@@ -61,6 +61,15 @@ pub const MAX_PART_BITS: u32 = 18;
 /// What the rounding of a part's corners can add up to, with room: sums of six products of numbers within [−1, 1].
 pub const PART_SLACK: f32 = 1.0 / (1 << 19) as f32;
 
+/// Levels of the small trees below the pages of an octree.
+pub const PAGE_LEVELS: u32 = 3;
+/// Invocations that build the tree below a page: as many as the finest level has lines.
+pub const PAGE_WORKGROUP: u32 = 64;
+/// Finest level that an octree may have: places along an axis take ten bits.
+pub const MAX_LEVELS: u32 = 10;
+/// Words of what an octree counts: registrations per level, then leaves.
+pub const TALLY_LENGTH: u32 = MAX_LEVELS + 2;
+
 /// The constants as WGSL.
 pub fn shader_prelude() -> String {
     let floats = [
@@ -84,6 +93,9 @@ pub fn shader_prelude() -> String {
         ("PAIR_BLOCK", PAIR_BLOCK),
         ("SEARCH_WINDOW", SEARCH_WINDOW),
         ("MAX_PART_BITS", MAX_PART_BITS),
+        ("PAGE_WORKGROUP", PAGE_WORKGROUP),
+        ("TALLY_LENGTH", TALLY_LENGTH),
+        ("TALLY_LEAVES", TALLY_LENGTH - 1),
         ("STATUS_TOO_FINE", status::TOO_FINE),
         ("STATUS_RADIUS", status::RADIUS),
         ("STATUS_KEY_BITS", status::KEY_BITS),

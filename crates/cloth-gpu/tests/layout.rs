@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a failed set-up is a failed test")]
 
 use cloth_gpu::kernel::Source;
-use cloth_gpu::layout::{Bounds, Entry, Grid, LengthParams, PairParams, SceneParams, SubdivisionParams};
-use cloth_gpu::stages::{bounds, cells, compact, features, pairs, scan, sort, subdivision};
+use cloth_gpu::layout::{
+    Bounds, Entry, Grid, LengthParams, OctreeParams, PairParams, SceneParams, SubdivisionParams,
+};
+use cloth_gpu::stages::{bounds, cells, compact, features, octree, pairs, scan, sort, subdivision};
 use std::mem::offset_of;
 
 /// Name, offset and size of each member, and the struct's size.
@@ -37,7 +39,21 @@ fn layouts_are_equal() {
         layout!(PairParams { most, word, start_low, start_high, count, pad_0, pad_1, pad_2 }),
         layout!(Bounds { low_0, is_active, high_0, body, low_1, pad_low, high_1, pad_high }),
         layout!(SubdivisionParams { triangles, second, room, coarseness, low, least, high, pad }),
-        layout!(Entry { centre, radius, triangle, control, key, pad }),
+        layout!(Entry { centre, radius, triangle, control, key, level }),
+        layout!(OctreeParams {
+            low,
+            triangles,
+            inverse,
+            base,
+            top,
+            page,
+            room,
+            two_stage,
+            level,
+            pad_0,
+            pad_1,
+            pad_2,
+        }),
     ] {
         assert_eq!(host, layout_in_wgsl(name), "{name}");
     }
@@ -54,6 +70,7 @@ fn all_sources() -> Vec<Source> {
     all.extend(cells::sources());
     all.extend(pairs::sources());
     all.extend(subdivision::sources());
+    all.extend(octree::sources());
     for flag in [false, true] {
         for subgroups in [false, true] {
             all.extend(scan::sources::<u32>(subgroups, flag));

@@ -5,7 +5,7 @@
 mod support;
 
 use cloth_gpu::collision::{Bvh, CollisionMesh, Detector, Mode, Query, Vec3};
-use cloth_gpu::{GpuOptions, GridGpu};
+use cloth_gpu::{GpuOptions, GridGpu, OctreeGpu};
 use std::time::Instant;
 use support::{device, difference, npz, pool};
 
@@ -81,5 +81,56 @@ fn subdivision_agrees_on_all() {
     let both = [Mode::Continuous, Mode::Discrete];
     for name in ["cloth-ball", "cloth-funnel", "n-body-simulation"] {
         agrees("virtual-subdivision", name, &both, &["first"]);
+    }
+}
+
+/// Octree, single-stage octree, virtual subdivision.
+fn octree_agrees(name: &str, mode: Mode, turns: &[&str]) {
+    let Some(device) = device(GpuOptions::default()) else { return };
+    let Some(Scene { x_t0, x_t1, triangles }) = scene(name) else { return };
+    let pool = pool(2);
+    let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+    let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode, active: None };
+    let expected = Bvh::new(&mesh, &x_t0).unwrap().detect(&mesh, &query, &pool).unwrap();
+    let mut tests = vec![];
+    for new in [OctreeGpu::new, OctreeGpu::single] {
+        let mut octree = new(device.gpu.clone(), &mesh).unwrap();
+        for turn in turns {
+            let clock = Instant::now();
+            let got = octree.detect(&mesh, &query, &pool).unwrap();
+            println!(
+                "{}, {name}, {mode:?}, {turn}: {:.2} s, {:?}, {} MiB, {:?}",
+                octree.name(),
+                clock.elapsed().as_secs_f64(),
+                octree.counted(),
+                octree.bytes() >> 20,
+                got.stats
+            );
+            assert_eq!(difference(&expected, &got), None, "{}, {name}, {mode:?}, {turn}", octree.name());
+            tests.push(got.stats.broad_phase_tests);
+        }
+    }
+    let (two_stage, single_stage) = tests.split_at(turns.len());
+    // The first trees have the same levels.
+    assert!(two_stage[0] <= single_stage[0], "{tests:?}");
+}
+
+#[test]
+fn octree_agrees_on_cloth_ball() {
+    octree_agrees("cloth-ball", Mode::Continuous, &["first"]);
+}
+
+#[test]
+fn octree_agrees_on_funnel() {
+    for mode in [Mode::Continuous, Mode::Discrete] {
+        octree_agrees("cloth-funnel", mode, &["first", "again", "once more"]);
+    }
+}
+
+#[test]
+#[ignore = "slow on a software adapter: run with --ignored"]
+fn octree_agrees_on_n_body() {
+    for mode in [Mode::Continuous, Mode::Discrete] {
+        octree_agrees("n-body-simulation", mode, &["first", "again"]);
     }
 }

@@ -2,7 +2,7 @@
 
 use cloth_sim::collision::mesh::Vec3;
 use cloth_sim::collision::{self, CollisionMesh, Contacts, Mode, Query};
-use cloth_sim::device::{self, Detected, Device, DeviceError, Reason};
+use cloth_sim::device::{self, Detected, Device, DeviceError, Reason, Tuning};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,6 +10,14 @@ use pyo3::types::PyDict;
 use crate::convert::{indices_to_numpy, queries_from, triangles_from, vertices_from};
 use crate::detach::{detached, pool};
 use crate::errors::{detect_error, device_error, invalid_input};
+
+/// `(vertex_triangle, time_vertex_triangle, edge_edge, time_edge_edge)`.
+pub(crate) type Pairs<'py> = (
+    Bound<'py, PyArray2<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<i64>>,
+    Bound<'py, PyArray1<f64>>,
+);
 
 /// `(hit, time)`, both of length n.
 type Answers<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);
@@ -29,7 +37,7 @@ type Answer<'py> = (
 
 /// All pairs in contact between two frames of one mesh; edges come back as their two vertices.
 #[pyfunction]
-#[pyo3(signature = (x_t0, x_t1, triangles, method, mode, thickness, device, threads))]
+#[pyo3(signature = (x_t0, x_t1, triangles, method, mode, thickness, device, threads, cell_factor))]
 pub(crate) fn detect<'py>(
     py: Python<'py>,
     x_t0: &Bound<'py, PyAny>,
@@ -40,24 +48,19 @@ pub(crate) fn detect<'py>(
     thickness: f64,
     device: &str,
     threads: Option<usize>,
+    cell_factor: Option<f64>,
 ) -> PyResult<Answer<'py>> {
     let device: Device = device.parse().map_err(|error| device_error(py, &error))?;
-    let mode = match mode {
-        "continuous" => Mode::Continuous,
-        "discrete" => Mode::Discrete,
-        other => {
-            let got = format!("\"{other}\"");
-            return Err(invalid_input(py, "mode", "one of \"continuous\", \"discrete\"", &got));
-        }
-    };
+    let mode = mode_from(py, mode)?;
     let x_t0 = vertices_from(x_t0, "x_t0")?;
     let x_t1 = vertices_from(x_t1, "x_t1")?;
     let triangles = triangles_from(triangles, "triangles", x_t0.len())?;
     let pool = pool(py, threads)?;
+    let tuning = Tuning { cell_factor };
     let work = || {
         let mesh = CollisionMesh::single(x_t0.len(), &triangles)?;
         let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
-        let detected = device::detect(&mesh, &query, method, device, &pool)?;
+        let detected = device::detect(&mesh, &query, method, &tuning, device, &pool)?;
         Ok::<_, DeviceError>((mesh, detected))
     };
     let (mesh, detected) = detached(py, work, device_error)?;
@@ -82,6 +85,18 @@ pub(crate) fn detect<'py>(
     ))
 }
 
+/// The mode of that name.
+pub(crate) fn mode_from(py: Python<'_>, name: &str) -> PyResult<Mode> {
+    match name {
+        "continuous" => Ok(Mode::Continuous),
+        "discrete" => Ok(Mode::Discrete),
+        other => {
+            let got = format!("\"{other}\"");
+            Err(invalid_input(py, "mode", "one of \"continuous\", \"discrete\"", &got))
+        }
+    }
+}
+
 fn stats_to_dict<'py>(py: Python<'py>, detected: &Detected) -> PyResult<Bound<'py, PyDict>> {
     let stats = &detected.contacts.stats;
     let dict = PyDict::new(py);
@@ -92,6 +107,9 @@ fn stats_to_dict<'py>(py: Python<'py>, detected: &Detected) -> PyResult<Bound<'p
     dict.set_item("candidates_vertex_triangle", stats.candidates_vertex_triangle)?;
     dict.set_item("candidates_edge_edge", stats.candidates_edge_edge)?;
     dict.set_item("root_searches", stats.root_searches)?;
+    for (name, count) in &detected.counts {
+        dict.set_item(*name, *count)?;
+    }
     let seconds = PyDict::new(py);
     for (stage, time) in &stats.seconds {
         seconds.set_item(*stage, *time)?;

@@ -86,7 +86,9 @@ pub(crate) fn detect_error(py: Python<'_>, error: &DetectError) -> PyErr {
         | DetectError::IndexOutOfRange { .. }
         | DetectError::RepeatedVertex { .. }
         | DetectError::TooLarge { .. }
-        | DetectError::OtherMesh { .. } => {
+        | DetectError::OtherMesh { .. }
+        | DetectError::ChangedTopology { .. }
+        | DetectError::ChangedBodies => {
             let message = error.to_string();
             exception(py, "InvalidInput", &message, |attributes| {
                 attributes.set_item("name", message.split(':').next())
@@ -106,6 +108,12 @@ pub(crate) fn device_error(py: Python<'_>, error: &DeviceError) -> PyErr {
         DeviceError::WrongDevice { method, expected } => {
             invalid_input(py, "method", expected, &format!("\"{method}\""))
         }
+        DeviceError::OtherMethod { parameter, owner, method } => invalid_input(
+            py,
+            parameter,
+            &format!("nothing, as only the method \"{owner}\" has it"),
+            &format!("a value for \"{method}\""),
+        ),
         DeviceError::Unavailable { .. } => exception(py, "GpuUnavailable", &error.to_string(), |_| Ok(())),
         DeviceError::Failed { device, .. } => {
             exception(py, "DeviceError", &error.to_string(), |attributes| {
@@ -188,6 +196,7 @@ pub(crate) fn sim_error(py: Python<'_>, error: &SimError) -> PyErr {
         }
         SimError::InvalidCheckpoint { .. } => exception(py, "CheckpointError", &message, |_| Ok(())),
         SimError::InvalidArgument { name, expected, got } => invalid_input(py, name, expected, got),
+        SimError::Device(inner) => device_error(py, inner),
         SimError::Stage { stage, .. } => {
             exception(py, "SolverFailed", &message, |attributes| attributes.set_item("stage", *stage))
         }

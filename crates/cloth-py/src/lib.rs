@@ -6,10 +6,12 @@ mod bending;
 mod collision;
 mod convert;
 mod detach;
+mod device;
 mod errors;
 mod friction;
 mod mesh;
 mod scene;
+mod session;
 mod simulation;
 
 use pyo3::prelude::*;
@@ -40,6 +42,12 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(collision::vertex_triangle_ccd, module)?)?;
     module.add_function(wrap_pyfunction!(collision::edge_edge_ccd, module)?)?;
     module.add_function(wrap_pyfunction!(collision::self_intersections, module)?)?;
+
+    module.add_function(wrap_pyfunction!(device::gpu_adapters, module)?)?;
+    module.add_function(wrap_pyfunction!(device::lose_gpu, module)?)?;
+    module.add_function(wrap_pyfunction!(device::let_auto_take_software, module)?)?;
+
+    module.add_class::<session::PySkippingSession>()?;
 
     module.add_class::<scene::PyScene>()?;
     module.add_function(wrap_pyfunction!(scene::scene_schema, module)?)?;

@@ -12,7 +12,7 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::Serialize;
 
 use crate::convert::{frames_from, points_to_numpy, triangles_from, vertices_from};
-use crate::errors::{invalid_input, sim_error};
+use crate::errors::{device_error, invalid_input, sim_error};
 use crate::mesh::{Arrays, mesh_from, mesh_to_numpy};
 use crate::scene::PyScene;
 
@@ -28,7 +28,7 @@ pub(crate) struct PySimulation {
 #[pymethods]
 impl PySimulation {
     #[new]
-    #[pyo3(signature = (scene, meshes, sequences, velocities, threads, allow_intersections))]
+    #[pyo3(signature = (scene, meshes, sequences, velocities, threads, device, allow_intersections))]
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyScene>,
@@ -36,6 +36,7 @@ impl PySimulation {
         sequences: &Bound<'_, PyDict>,
         velocities: &Bound<'_, PyDict>,
         threads: Option<usize>,
+        device: &str,
         allow_intersections: bool,
     ) -> PyResult<Self> {
         let mut assets = Assets::default();
@@ -54,7 +55,9 @@ impl PySimulation {
         for (name, array) in velocities {
             assets.velocities.insert(name.extract()?, vertices_from(&array, "velocities")?);
         }
-        let options = SimulationOptions { threads, allow_intersections };
+        let device = device.parse().map_err(|error| device_error(py, &error))?;
+        let options =
+            SimulationOptions { threads, allow_intersections, device, ..SimulationOptions::default() };
         let scene = &scene.get().scene;
         let simulation = py
             .detach(|| Simulation::new(scene, assets, options).map_err(Box::new))
@@ -64,10 +67,12 @@ impl PySimulation {
 
     /// The simulation that a checkpoint holds.
     #[staticmethod]
-    #[pyo3(signature = (bytes, threads))]
-    fn resume(py: Python<'_>, bytes: &[u8], threads: Option<usize>) -> PyResult<Self> {
+    #[pyo3(signature = (bytes, threads, device))]
+    fn resume(py: Python<'_>, bytes: &[u8], threads: Option<usize>, device: &str) -> PyResult<Self> {
+        let device = device.parse().map_err(|error| device_error(py, &error))?;
+        let options = SimulationOptions { threads, device, ..SimulationOptions::default() };
         let simulation = py
-            .detach(|| Simulation::resume(bytes, threads).map_err(Box::new))
+            .detach(|| Simulation::resume_on(bytes, options).map_err(Box::new))
             .map_err(|error| sim_error(py, &error))?;
         Ok(Self { simulation: Mutex::new(simulation) })
     }
@@ -162,16 +167,16 @@ impl PySimulation {
         Ok((json(py, &plan)?, plan.to_string()))
     }
 
-    /// Totals, effects, threads and steps left out of the report, without its steps, as JSON.
+    /// The report without its steps, as JSON.
     fn summary(&self, py: Python<'_>) -> PyResult<String> {
-        let (totals, effects, threads, left_out) = self.read(py, |simulation| {
-            let report = simulation.report();
-            (report.totals.clone(), report.effects.clone(), report.threads, report.left_out)
-        });
-        let summary = serde_json::json!({
-            "totals": totals, "effects": effects, "threads": threads, "left_out": left_out
-        });
-        json(py, &summary)
+        let report = self.read(py, |simulation| simulation.report().without_steps());
+        json(py, &report)
+    }
+
+    /// The GPUs that were asked for and could not be had, or failed on the way, as JSON.
+    fn fallbacks(&self, py: Python<'_>) -> PyResult<String> {
+        let fallbacks = self.read(py, |simulation| simulation.report().fallbacks.clone());
+        json(py, &fallbacks)
     }
 
     /// The reports of the steps from number `first` (from 0, those left out counted) on, as JSON.

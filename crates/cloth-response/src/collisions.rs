@@ -102,8 +102,10 @@ impl Detection<'_> {
             active: only_changed.then_some(&motion.buffers.changed),
         };
         let contacts = match &mut self.other {
-            Some(detector) => detector.detect(self.mesh, &query, self.pool)?,
-            None => self.bvh.detect(self.mesh, &query, self.pool)?,
+            Some(detector) if !only_changed || detector.narrows() => {
+                detector.detect(self.mesh, &query, self.pool)?
+            }
+            _ => self.bvh.detect(self.mesh, &query, self.pool)?,
         };
         push_hits(self.mesh, &contacts, out);
         Ok(())

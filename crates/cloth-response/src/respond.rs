@@ -122,7 +122,8 @@ impl Responder {
         self.run(Detection { mesh, bvh, other: None, pool }, inv_mass, x_t0, x_t1, v, dt)
     }
 
-    /// [`Responder::respond`] with another method for the continuous detection; `bvh` still finds proximities.
+    /// [`Responder::respond`] with another method for the continuous detection; `bvh` still finds proximities, and pairs with a
+    /// changed vertex where the method does not narrow ([`Detector::narrows`]).
     ///
     /// # Errors
     /// As [`Responder::respond`].

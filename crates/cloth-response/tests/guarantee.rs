@@ -194,6 +194,53 @@ fn judge_finds_what_a_blind_response_leaves() {
     assert!(left > 0);
 }
 
+/// Brute force that takes as long for few active vertices as for all.
+#[derive(Default)]
+struct Whole {
+    queries: usize,
+}
+
+impl Detector for Whole {
+    fn name(&self) -> &'static str {
+        "whole"
+    }
+
+    fn narrows(&self) -> bool {
+        false
+    }
+
+    fn detect(
+        &mut self,
+        mesh: &collision::CollisionMesh,
+        query: &Query<'_>,
+        pool: &rayon::ThreadPool,
+    ) -> Result<Contacts, DetectError> {
+        assert!(query.active.is_none(), "few pairs are the hierarchy's");
+        self.queries += 1;
+        collision::BruteForce.detect(mesh, query, pool)
+    }
+}
+
+/// A method that does not narrow is asked once per step, for all pairs; the hierarchy does the rest, to the same bits.
+#[test]
+fn a_method_that_does_not_narrow_is_asked_for_all_pairs_only() {
+    let (mut whole, mut passes) = (Whole::default(), 0);
+    for seed in 0..6 {
+        let (mut world, _, _) = tangle(seed, params());
+        let (mut x_t1, mut v) = world.candidate(TANGLE_DT, &|_, x, _| *x);
+        let (mut x_expected, mut v_expected) = (x_t1.clone(), v.clone());
+        let World { mesh, bvh, responder, inv_mass, x, pool, .. } = &mut world;
+        responder.respond(mesh, bvh, inv_mass, x, &mut x_expected, &mut v_expected, TANGLE_DT, pool).unwrap();
+        let info = responder
+            .respond_with(mesh, bvh, &mut whole, inv_mass, x, &mut x_t1, &mut v, TANGLE_DT, pool)
+            .unwrap();
+        assert!(x_t1 == x_expected && v == v_expected);
+        passes += info.passes;
+    }
+    assert_eq!(whole.queries, 6);
+    assert!(passes > 6, "some step looked again");
+}
+
 /// The same bits for one, two and three threads.
 #[test]
 fn threads_do_not_change_the_answer() {

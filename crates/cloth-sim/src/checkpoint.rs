@@ -6,7 +6,7 @@
 use crate::constraints::Holds;
 use crate::simulation::Pending;
 use crate::step::State;
-use crate::{Assets, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
+use crate::{Assets, Report, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
 use cloth_core::mesh::TriMesh;
 use std::collections::BTreeMap;
 
@@ -60,12 +60,22 @@ impl Simulation {
     /// # Errors
     /// [`SimError::InvalidCheckpoint`] for bytes that are no checkpoint, of another version, cut off or damaged.
     pub fn resume(bytes: &[u8], threads: Option<usize>) -> Result<Self, SimError> {
+        Self::resume_on(bytes, SimulationOptions { threads, ..SimulationOptions::default() })
+    }
+
+    /// [`Simulation::resume`] on a device, which may be another one than before: results do not depend on it. Of the other options
+    /// the checkpoint has its own, which hold where these say nothing.
+    ///
+    /// # Errors
+    /// As [`Simulation::resume`], and as [`Simulation::new`] for the device.
+    pub fn resume_on(bytes: &[u8], options: SimulationOptions) -> Result<Self, SimError> {
         let mut payload = Reader(open(bytes)?);
         let scene = Scene::from_json(&payload.text()?)?;
         let saved = payload.u64()? as usize;
         let options = SimulationOptions {
-            threads: threads.or((saved > 0).then_some(saved)),
-            allow_intersections: payload.u64()? != 0,
+            threads: options.threads.or((saved > 0).then_some(saved)),
+            allow_intersections: payload.u64()? != 0 || options.allow_intersections,
+            ..options
         };
         let (time, step) = (payload.f64()?, payload.u64()?);
         let (x, v, contact_force) = (payload.points()?, payload.points()?, payload.points()?);
@@ -96,9 +106,10 @@ impl Simulation {
             .set_memory(&memory)
             .map_err(|e| invalid("what this scene's laws remember", e.to_string()))?;
         sim.pending = (pending.steps > 0).then_some(pending);
-        let threads = sim.report.threads;
-        sim.report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
-        sim.report.threads = threads;
+        let past: Report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
+        let here = std::mem::replace(&mut sim.report, past);
+        (sim.report.threads, sim.report.detection) = (here.threads, here.detection);
+        sim.report.fallbacks.extend(here.fallbacks);
         Ok(sim)
     }
 }

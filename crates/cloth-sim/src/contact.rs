@@ -2,10 +2,11 @@
 
 use crate::bodies::Bodies;
 use crate::constraints::ConstraintStage;
+use crate::device::{Continuous, DeviceError};
 use crate::pins::PinSet;
 use crate::scene::{Contact, ContactMethod};
-use crate::{Scene, SimError, Vec3};
-use cloth_collision::{Body, Bvh, CollisionMesh, Detector, detector, intersections};
+use crate::{Scene, SimError, SimulationOptions, Vec3};
+use cloth_collision::{Body, Bvh, CollisionMesh, intersections};
 use cloth_response::{FrictionRule, Responder, ResponseParams};
 
 /// What a scene with contact has and one without does not.
@@ -14,8 +15,8 @@ pub(crate) struct ContactStage {
     pub(crate) bvh: Bvh,
     /// With `contact.method = "constraints"`.
     pub(crate) constraints: Option<ConstraintStage>,
-    /// Another method than the hierarchy for continuous detection.
-    pub(crate) continuous: Option<Box<dyn Detector>>,
+    /// Who detects continuously.
+    pub(crate) continuous: Continuous,
     pub(crate) responder: Responder,
     /// Whether known intersections are allowed.
     pub(crate) allow: bool,
@@ -27,12 +28,12 @@ impl ContactStage {
     pub(crate) fn new(
         scene: &Scene,
         contact: &Contact,
-        allow: bool,
+        options: SimulationOptions,
         bodies: &Bodies,
         pins: &PinSet,
         x: &[Vec3],
     ) -> Result<Self, SimError> {
-        let allow = allow || contact.allow_intersections;
+        let allow = options.allow_intersections || contact.allow_intersections;
         // Strain limits alone: nothing meets anything.
         let meets = scene.contact.is_some();
         let cloth = bodies.cloth.iter().zip(&scene.cloth).map(|(body, source)| {
@@ -49,10 +50,11 @@ impl ContactStage {
             mesh.set_attachment(vertex, (bodies.cloth.len() + collider) as u32);
         }
         let bvh = Bvh::new(&mesh, x).map_err(|e| stage("collision mesh", &e))?;
-        let continuous = if contact.detector == bvh.name() {
-            None
+        let continuous = if meets {
+            Continuous::choose(&contact.detector, options.device, options.gpu, &mesh, x)
+                .map_err(|error| refused(scene, error))?
         } else {
-            Some(detector(&contact.detector, &mesh, x).map_err(|e| stage("detector", &e))?)
+            Continuous::tree("nothing meets anything")
         };
         let friction = FrictionRule::from_pairs(list.len(), |a, b| scene.friction_law(contact, a, b));
         let constraints = (meets && contact.method == ContactMethod::Constraints)
@@ -102,6 +104,17 @@ impl ContactStage {
             + self.bvh.bytes()
             + self.responder.bytes()
             + self.constraints.as_ref().map_or(0, ConstraintStage::bytes)
+    }
+}
+
+/// The error of a detector that cannot be had, in terms of the scene where it is the scene's.
+fn refused(scene: &Scene, error: DeviceError) -> SimError {
+    match error {
+        DeviceError::WrongDevice { method, expected } => {
+            SimError::InvalidScene(scene.error("contact.detector", expected, format!("\"{method}\"")))
+        }
+        DeviceError::Query(error) => stage("detector", &error),
+        error => SimError::Device(error),
     }
 }
 

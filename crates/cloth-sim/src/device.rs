@@ -4,30 +4,92 @@ use crate::collision::mesh::Vec3;
 use crate::collision::{self, CollisionMesh, Contacts, DetectError, Query};
 use crate::scene::nearest;
 
+mod continuous;
+pub(crate) use continuous::Continuous;
+
+#[cfg(feature = "gpu")]
+mod adapters;
+#[cfg(feature = "gpu")]
+mod gpu_detector;
+#[cfg(feature = "gpu")]
+mod hardware;
+#[cfg(feature = "gpu")]
+mod methods;
 #[cfg(feature = "gpu")]
 mod shared;
 #[cfg(feature = "gpu")]
+pub use adapters::adapters;
+#[cfg(feature = "gpu")]
+pub(crate) use gpu_detector::GpuDetector;
+#[cfg(feature = "gpu")]
 pub use shared::SharedGpu;
 
-/// Methods that run on the CPU.
-pub const CPU_METHODS: [&str; 2] = ["brute", "bvh"];
+#[cfg(not(feature = "gpu"))]
+mod absent;
+#[cfg(not(feature = "gpu"))]
+pub(crate) use absent::GpuDetector;
+#[cfg(not(feature = "gpu"))]
+pub use absent::{SharedGpu, adapters};
+
+/// Methods that run on the CPU; [`crate::collision::detector`] builds them.
+pub const CPU_METHODS: [&str; 3] = ["brute", "bvh", "session"];
 /// Methods that run on a GPU.
-pub const GPU_METHODS: [&str; 2] = ["grid", "virtual-subdivision"];
+pub const GPU_METHODS: [&str; 4] = ["grid", "virtual-subdivision", "octree-single", "octree"];
 /// The method of `"auto"` on the CPU, and of a GPU's method where there is no GPU.
 const CPU_DEFAULT: &str = "bvh";
 /// The method of `"auto"` on a GPU.
 const GPU_DEFAULT: &str = "virtual-subdivision";
 const DEVICES: [&str; 3] = ["cpu", "gpu", "auto"];
 
+/// The method that has λ.
+const SUBDIVIDING: &str = "virtual-subdivision";
+
+/// Choices within a GPU's method; the contacts never depend on them.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Tuning {
+    /// λ of `"virtual-subdivision"` (thesis Eq. 5.1): cells are 3 λ times the average radius. From 0.1 to 100; by default 1.2.
+    pub cell_factor: Option<f64>,
+}
+
+impl Tuning {
+    fn check(&self, method: &str) -> Result<(), DeviceError> {
+        let Some(got) = self.cell_factor else { return Ok(()) };
+        let parameter = "cell_factor";
+        if !(0.1..=100.0).contains(&got) {
+            return Err(DetectError::Parameter { parameter, expected: "λ from 0.1 to 100", got }.into());
+        }
+        if method != SUBDIVIDING {
+            return Err(DeviceError::OtherMethod {
+                parameter,
+                owner: SUBDIVIDING,
+                method: method.to_owned(),
+            });
+        }
+        Ok(())
+    }
+}
+
 /// Where to detect.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Device {
     /// The CPU.
     Cpu,
     /// A GPU, be it a software adapter.
     Gpu,
     /// A GPU that is no software adapter, for `"auto"` and for methods that run on one; else the CPU.
+    #[default]
     Auto,
+}
+
+impl Device {
+    /// The name that [`str::parse`] takes.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
+            Self::Auto => "auto",
+        }
+    }
 }
 
 impl std::str::FromStr for Device {
@@ -43,6 +105,29 @@ impl std::str::FromStr for Device {
     }
 }
 
+/// An adapter, what it allows, and which devices take it.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Adapter {
+    /// Adapter, driver and back end.
+    pub name: String,
+    /// `"discrete"`, `"integrated"`, `"virtual"`, `"other"` or `"software"`.
+    pub kind: &'static str,
+    /// Largest array \[B\].
+    pub max_binding_bytes: u64,
+    /// Memory that the invocations of a workgroup share \[B\].
+    pub workgroup_bytes: u32,
+    /// Workgroups per dimension of a dispatch.
+    pub max_workgroups: u32,
+    /// It has subgroup operations.
+    pub subgroups: bool,
+    /// It measures the seconds of stages.
+    pub timestamps: bool,
+    /// Why it cannot be used, if it cannot.
+    pub problem: Option<String>,
+    /// The devices that take it: `"gpu"`, `"auto"`, both or none.
+    pub devices: Vec<&'static str>,
+}
+
 /// The contacts, who found them, and why not somebody else.
 #[derive(Debug)]
 pub struct Detected {
@@ -52,6 +137,8 @@ pub struct Detected {
     pub method: &'static str,
     /// `"cpu"`, or the adapter with its driver.
     pub device: String,
+    /// What only this method counts: registrations, parts or leaves, bytes on the device; none on the CPU.
+    pub counts: Vec<(&'static str, u64)>,
     /// Why the CPU, where a GPU would have been taken.
     pub reason: Option<Reason>,
 }
@@ -88,14 +175,29 @@ pub enum DeviceError {
         /// Which methods run where.
         expected: String,
     },
+    /// The method has no such parameter.
+    #[error(
+        "{parameter}: expected nothing, as only the method \"{owner}\" has it, got a value for \"{method}\""
+    )]
+    OtherMethod {
+        /// The parameter.
+        parameter: &'static str,
+        /// The method that has it.
+        owner: &'static str,
+        /// The method that was asked for.
+        method: String,
+    },
     /// There is no GPU, or none that opens.
-    #[error("device: expected a GPU (a Vulkan, Metal or DX12 adapter; a software adapter will do): {reason}")]
+    #[error(
+        "device: expected a GPU (a Vulkan, Metal or DX12 adapter; a software adapter will do): {reason}; `clothsim doctor` lists \
+         adapters, and the devices \"cpu\" and \"auto\" do without"
+    )]
     Unavailable {
         /// What was found instead.
         reason: String,
     },
     /// The GPU gave no answer.
-    #[error("device: {device}: {reason}")]
+    #[error("device: {device}: {reason}; device \"cpu\" does without it, device \"auto\" when it fails")]
     Failed {
         /// The adapter with its driver.
         device: String,
@@ -124,6 +226,11 @@ fn unknown(parameter: &'static str, got: &str, known: &[&'static str]) -> Device
     }
 }
 
+/// Names of the methods, those of the CPU first, `"auto"` last.
+pub(crate) fn method_names() -> Vec<&'static str> {
+    CPU_METHODS.into_iter().chain(GPU_METHODS).chain(["auto"]).collect()
+}
+
 /// A method by its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Method {
@@ -143,10 +250,7 @@ impl std::str::FromStr for Method {
         if let Some(name) = find(&CPU_METHODS) {
             return Ok(Self::Cpu(name));
         }
-        find(&GPU_METHODS).map(Self::Gpu).ok_or_else(|| {
-            let known: Vec<_> = CPU_METHODS.into_iter().chain(GPU_METHODS).chain(["auto"]).collect();
-            unknown("method", name, &known)
-        })
+        find(&GPU_METHODS).map(Self::Gpu).ok_or_else(|| unknown("method", name, &method_names()))
     }
 }
 
@@ -159,10 +263,10 @@ fn wrong_device(method: &'static str, device: &str) -> DeviceError {
     DeviceError::WrongDevice { method, expected }
 }
 
-/// Detects with the method `"brute"`, `"bvh"` (CPU), `"grid"`, `"virtual-subdivision"` (GPU) or `"auto"`, on the device.
+/// Detects with one of [`CPU_METHODS`] or [`GPU_METHODS`], or `"auto"`, on the device.
 ///
 /// The GPU is opened at the first call that wants it and kept; one call at a time computes on it. After a failure the next call
-/// opens it anew.
+/// opens it anew. The last two topologies stay on it, so that calls for the same mesh do not write it again.
 ///
 /// # Errors
 /// [`DeviceError`]; with [`Device::Auto`], a GPU that is missing or fails is none: the CPU answers.
@@ -170,10 +274,13 @@ pub fn detect(
     mesh: &CollisionMesh,
     query: &Query<'_>,
     method: &str,
+    tuning: &Tuning,
     device: Device,
     pool: &rayon::ThreadPool,
 ) -> Result<Detected, DeviceError> {
-    let on_cpu = match (method.parse()?, device) {
+    let kind = method.parse()?;
+    tuning.check(method)?;
+    let on_cpu = match (kind, device) {
         (Method::Cpu(name), Device::Cpu | Device::Auto) => Some(name),
         (Method::Auto, Device::Cpu) => Some(CPU_DEFAULT),
         (Method::Cpu(name), Device::Gpu) => return Err(wrong_device(name, "gpu")),
@@ -185,21 +292,7 @@ pub fn detect(
         return detect_on_cpu(mesh, query, name, None, pool);
     }
     let name = GPU_METHODS.into_iter().find(|&n| n == method).unwrap_or(GPU_DEFAULT);
-    #[cfg(feature = "gpu")]
-    {
-        SharedGpu::of_process().detect(mesh, query, name, device, pool)
-    }
-    #[cfg(not(feature = "gpu"))]
-    {
-        let reason = "this build has no GPU methods (cargo feature \"gpu\")".to_owned();
-        match device {
-            Device::Auto => {
-                let reason = Reason::NoGpu(format!("\"{name}\": {reason}"));
-                detect_on_cpu(mesh, query, CPU_DEFAULT, Some(reason), pool)
-            }
-            _ => Err(DeviceError::Unavailable { reason }),
-        }
-    }
+    SharedGpu::of_process().detect(mesh, query, name, tuning, device, pool)
 }
 
 fn detect_on_cpu(
@@ -211,5 +304,5 @@ fn detect_on_cpu(
 ) -> Result<Detected, DeviceError> {
     let x: &[Vec3] = query.x_t0;
     let contacts = collision::detector(method, mesh, x)?.detect(mesh, query, pool)?;
-    Ok(Detected { contacts, method, device: "cpu".to_owned(), reason })
+    Ok(Detected { contacts, method, device: "cpu".to_owned(), counts: vec![], reason })
 }

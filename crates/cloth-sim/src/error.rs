@@ -67,6 +67,9 @@ pub enum SimError {
         /// What came.
         got: String,
     },
+    /// The GPU is missing or gave no answer; the state is the last good one, and the next step asks it again.
+    #[error(transparent)]
+    Device(#[from] crate::device::DeviceError),
     /// A stage refused what it was given for a reason that is not the scene's.
     #[error("{stage}: {message}")]
     Stage {

@@ -4,6 +4,7 @@ use crate::bodies::Bodies;
 use crate::contact::ContactStage;
 use crate::friction::LawName;
 use crate::pins::PinSet;
+use crate::report::Detection;
 use crate::scene::{Contact, ContactMethod};
 use crate::step::State;
 use crate::{Scene, SceneError};
@@ -42,6 +43,8 @@ pub struct Plan {
     pub dt: f64,
     /// Estimate of the largest stable step at the start [s], for explicit integrators.
     pub stable_dt: Option<f64>,
+    /// Who detects continuously; none without contact.
+    pub detection: Option<Detection>,
     /// What is likely to go wrong.
     pub warnings: Vec<String>,
 }
@@ -62,6 +65,9 @@ impl fmt::Display for Plan {
         )?;
         if let Some(stable) = self.stable_dt {
             writeln!(f, "largest stable step at the start: about {stable:.3e} s")?;
+        }
+        if let Some(Detection { detector, device, why, .. }) = &self.detection {
+            writeln!(f, "detection: \"{detector}\" on {device} ({why})")?;
         }
         let width = self.effects.iter().map(|e| e.name.chars().count()).max().unwrap_or(0);
         for effect in self.effects.iter().filter(|e| e.on) {
@@ -222,6 +228,7 @@ pub(crate) fn build(
             })
         }));
     }
+    warnings.extend(contact.and_then(|stage| stage.continuous.lack.as_ref()).map(ToString::to_string));
     let triangles = bodies.cloth.iter().map(|c| c.mesh.triangles.len()).sum::<usize>()
         + bodies.colliders.iter().map(|c| c.triangles.len()).sum::<usize>();
     effects.on.append(&mut effects.off);
@@ -232,6 +239,9 @@ pub(crate) fn build(
         triangles,
         dt: scene.time.dt,
         stable_dt: stable_dt.filter(|s| s.is_finite()),
+        detection: contact
+            .filter(|_| scene.contact.is_some())
+            .map(|stage| stage.continuous.detection.clone()),
         warnings,
     }
 }
@@ -250,7 +260,7 @@ fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Op
     let mesh = &stage.mesh;
     effects.on(
         "contact",
-        format!("[contact] with detector \"{}\"", contact.detector),
+        format!("[contact] with detector \"{}\"", stage.continuous.detection.detector),
         mesh.triangles.len(),
         stage.bytes(),
     );

@@ -16,6 +16,57 @@ pub struct Report {
     pub effects: Vec<EffectCost>,
     /// Threads of the pool.
     pub threads: usize,
+    /// Who detects continuously; none without contact.
+    #[serde(default)]
+    pub detection: Option<Detection>,
+    /// GPUs that were asked for and could not be had, or failed on the way.
+    #[serde(default)]
+    pub fallbacks: Vec<Fallback>,
+}
+
+/// Who detects continuously in a simulation.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Detection {
+    /// Name of the method.
+    pub detector: String,
+    /// `"cpu"`, or the GPU with its driver.
+    pub device: String,
+    /// What chose it.
+    pub why: String,
+    /// Most memory on the GPU so far [B]; 0 on the CPU.
+    pub device_bytes: u64,
+}
+
+impl Detection {
+    pub(crate) fn on_cpu(detector: &str, why: &str) -> Self {
+        Self { detector: detector.into(), device: "cpu".into(), why: why.into(), device_bytes: 0 }
+    }
+}
+
+/// A GPU that was done without from a step on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Fallback {
+    /// Number of the step in which it failed, from 1, and which was done again on the CPU; of a GPU that could not be had at the
+    /// start, the number of steps before.
+    pub step: u64,
+    /// Start of that step [s].
+    pub time: f64,
+    /// Name of the method.
+    pub detector: String,
+    /// The GPU with its driver, or `"no GPU"`.
+    pub device: String,
+    /// What is wrong.
+    pub reason: String,
+}
+
+impl std::fmt::Display for Fallback {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { step, detector, device, reason, .. } = self;
+        write!(
+            f,
+            "detector \"{detector}\": on the CPU instead of a GPU since step {step}: {device}: {reason}"
+        )
+    }
 }
 
 /// One step.
@@ -201,18 +252,38 @@ impl Report {
         &self.steps[first.saturating_sub(self.left_out).min(self.steps.len())..]
     }
 
+    /// The same with no table of a step.
+    #[must_use]
+    pub fn without_steps(&self) -> Self {
+        Self { left_out: self.left_out, ..self.without_steps_before(usize::MAX) }
+    }
+
     /// The same without the steps before number `first`.
     pub(crate) fn without_steps_before(&self, first: usize) -> Self {
         let steps = self.steps_from(first).to_vec();
         let left_out = self.left_out + self.steps.len() - steps.len();
-        let (totals, effects, threads) = (self.totals.clone(), self.effects.clone(), self.threads);
-        Self { steps, left_out, totals, effects, threads }
+        Self {
+            steps,
+            left_out,
+            totals: self.totals.clone(),
+            effects: self.effects.clone(),
+            threads: self.threads,
+            detection: self.detection.clone(),
+            fallbacks: self.fallbacks.clone(),
+        }
     }
 
     /// Notes the memory that an effect holds now [B].
     pub(crate) fn grow(&mut self, effect: &str, bytes: usize) {
         if let Some(effect) = self.effects.iter_mut().find(|e| e.name == effect) {
             effect.bytes = effect.bytes.max(bytes);
+        }
+    }
+
+    /// Notes the memory that detection holds on the GPU now [B].
+    pub(crate) fn grow_on_device(&mut self, bytes: u64) {
+        if let Some(detection) = &mut self.detection {
+            detection.device_bytes = detection.device_bytes.max(bytes);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use crate::bodies::Bodies;
 use crate::contact::ContactStage;
+use crate::device::{Device, SharedGpu};
 use crate::guard::Guard;
 use crate::pins::PinSet;
 use crate::scene::Contact;
@@ -12,12 +13,27 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// How to run, as opposed to what.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct SimulationOptions {
     /// Threads of the simulation's pool; by default all that the machine offers. Results do not depend on it.
     pub threads: Option<usize>,
     /// Runs from a start with intersections even if the scene does not say so.
     pub allow_intersections: bool,
+    /// Where to detect continuously. Results do not depend on it.
+    pub device: Device,
+    /// The GPU, if one is used; by default the process's.
+    pub gpu: &'static SharedGpu,
+}
+
+impl Default for SimulationOptions {
+    fn default() -> Self {
+        Self {
+            threads: None,
+            allow_intersections: false,
+            device: Device::default(),
+            gpu: SharedGpu::of_process(),
+        }
+    }
 }
 
 /// What [`Simulation::advance`] did.
@@ -65,7 +81,8 @@ impl Simulation {
     ///
     /// # Errors
     /// [`SimError::InvalidScene`] naming file, line and key; [`SimError::StartIntersections`];
-    /// [`SimError::InvalidArgument`] for a number of threads that is zero or cannot be had.
+    /// [`SimError::InvalidArgument`] for a number of threads that is zero or cannot be had; [`SimError::Device`] for a GPU that was
+    /// asked for and cannot be had.
     pub fn new(scene: &Scene, assets: Assets, options: SimulationOptions) -> Result<Self, SimError> {
         let sim = Self::build(scene, assets, options, None)?;
         sim.check_start()?;
@@ -118,16 +135,18 @@ impl Simulation {
         }
         let integrator =
             Integrator::new(system, integrator_params(scene), Arc::clone(&pool)).map_err(core_error)?;
-        let allow = options.allow_intersections;
-        let contact = match &scene.contact {
-            Some(contact) => Some(ContactStage::new(scene, contact, allow, &bodies, &pins, &state.x)?),
+        let mut contact = match &scene.contact {
+            Some(contact) => Some(ContactStage::new(scene, contact, options, &bodies, &pins, &state.x)?),
             // Strain limits are met by the response, also where there is no contact.
             None if scene.cloth.iter().any(|c| c.strain_limit.is_some()) => {
                 let contact = Contact::default();
-                Some(ContactStage::new(scene, &contact, allow, &bodies, &pins, &state.x)?)
+                Some(ContactStage::new(scene, &contact, options, &bodies, &pins, &state.x)?)
             }
             None => None,
         };
+        if let Some(lack) = contact.as_mut().and_then(|stage| stage.continuous.lack.as_mut()) {
+            (lack.step, lack.time) = (state.step, state.time);
+        }
         let plan = plan::build(scene, &bodies, &integrator, contact.as_ref(), &pins, &state);
         let effects = plan
             .effects
@@ -140,7 +159,10 @@ impl Simulation {
                 milliseconds: None,
             })
             .collect();
-        let report = Report { threads: pool.current_num_threads(), effects, ..Report::default() };
+        let detection = plan.detection.clone();
+        let threads = pool.current_num_threads();
+        let fallbacks = contact.iter().filter_map(|stage| stage.continuous.lack.clone()).collect();
+        let report = Report { effects, threads, detection, fallbacks, ..Report::default() };
         Ok(Self {
             infos: bodies.infos(scene),
             guard: Guard::new(&bodies),
@@ -165,7 +187,8 @@ impl Simulation {
     /// Takes one step of the scene's `time.dt`.
     ///
     /// # Errors
-    /// [`SimError::Diverged`], [`SimError::Stuck`]: the step failed at every size tried; the state is the last good one.
+    /// [`SimError::Diverged`], [`SimError::Stuck`]: the step failed at every size tried; [`SimError::Device`]: the GPU that was asked
+    /// for gave no answer. The state is the last good one.
     pub fn step(&mut self) -> Result<(), SimError> {
         let dt = self.scene.time.dt;
         self.step_to(self.state.time + dt, dt)

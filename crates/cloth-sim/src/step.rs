@@ -10,6 +10,7 @@ use crate::guard::Alarm;
 use crate::pins::PinSet;
 use crate::report::add_seconds;
 use crate::{SimError, Simulation, StepReport, Vec3};
+use cloth_collision::DetectError;
 use cloth_core::{Pins, StepInfo};
 use cloth_response::{ResponseError, ResponseInfo};
 use std::time::Instant;
@@ -63,6 +64,8 @@ pub(crate) enum Failure {
         pairs: Vec<[u32; 4]>,
         vertices: Vec<u32>,
     },
+    /// The GPU gave no answer, for this reason.
+    Device(String),
     /// Not a matter of the step's size.
     Stop(SimError),
 }
@@ -85,6 +88,7 @@ impl Simulation {
                     report.substeps += 1;
                 }
                 Err(Failure::Stop(error)) => return Err(error),
+                Err(Failure::Device(reason)) => self.lose_device(&reason)?,
                 Err(_) if size > 1 => {
                     size /= 2;
                     report.retries += 1;
@@ -108,7 +112,17 @@ impl Simulation {
         self.report.push(report, started.elapsed().as_secs_f64());
         if let Some(contact) = &self.contact {
             self.report.grow("contact", contact.bytes());
+            self.report.grow_on_device(contact.continuous.device_bytes());
         }
+        Ok(())
+    }
+
+    /// Goes on without the GPU that gave no answer, or stops; the state is as before the attempt, which may then be made again.
+    fn lose_device(&mut self, reason: &str) -> Result<(), SimError> {
+        let Some(contact) = &mut self.contact else { return Ok(()) };
+        let fallback = contact.continuous.fall_back(self.state.step + 1, self.state.time, reason)?;
+        self.report.detection = Some(contact.continuous.detection.clone());
+        self.report.fallbacks.push(fallback);
         Ok(())
     }
 
@@ -216,15 +230,16 @@ impl Simulation {
             return Ok(None);
         };
         let (x_t0, masses, pool) = (&self.state.x, &self.inv_mass, &self.pool);
-        let result = match continuous {
+        let result = match continuous.other() {
             None => responder.respond(mesh, bvh, masses, x_t0, x, v, dt, pool),
-            Some(other) => responder.respond_with(mesh, bvh, other.as_mut(), masses, x_t0, x, v, dt, pool),
+            Some(other) => responder.respond_with(mesh, bvh, other, masses, x_t0, x, v, dt, pool),
         };
         let info = result.map_err(|error| match error {
             ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
             ResponseError::NotFinite { name, vertex } => {
                 Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
             }
+            ResponseError::Detect(DetectError::Device { reason, .. }) => Failure::Device(reason),
             other => Failure::Stop(stage("contact", &other)),
         })?;
         for (name, seconds) in &info.seconds {

@@ -142,7 +142,11 @@ fn known_intersections_do_not_grow_and_are_counted() {
         } else {
             crossing()
         };
-        let options = SimulationOptions { threads: Some(1), allow_intersections: !by_scene };
+        let options = SimulationOptions {
+            threads: Some(1),
+            allow_intersections: !by_scene,
+            ..SimulationOptions::default()
+        };
         let mut sim = Simulation::new(&scene(&text), Assets::default(), options).unwrap();
         let start = sim.intersections().unwrap().len();
         advance(&mut sim, 0.1).unwrap_or_else(|e| panic!("{e}"));

@@ -5,7 +5,7 @@
 
 use cloth_sim::collision::mesh::Vec3;
 use cloth_sim::collision::{CollisionMesh, Mode, Query};
-use cloth_sim::device::{Device, DeviceError, Reason, SharedGpu};
+use cloth_sim::device::{Device, DeviceError, Reason, SharedGpu, Tuning};
 
 #[test]
 fn a_lost_gpu_is_an_error_or_a_stated_fall_back_and_is_opened_anew() {
@@ -17,7 +17,7 @@ fn a_lost_gpu_is_an_error_or_a_stated_fall_back_and_is_opened_anew() {
     let mesh = CollisionMesh::single(6, &[[0, 1, 2], [3, 4, 5]]).unwrap();
     let query = Query { x_t0: &x, x_t1: &x, thickness: 0.2, mode: Mode::Discrete, active: None };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let detect = |device| shared.detect(&mesh, &query, "grid", device, &pool);
+    let detect = |device| shared.detect(&mesh, &query, "grid", &Tuning::default(), device, &pool);
 
     let first = match detect(Device::Gpu) {
         Err(DeviceError::Unavailable { reason }) => {

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from clothsim import _core
-from clothsim._cli import vulkan
+from clothsim._cli.adapters import adapters
 from clothsim._data import VARIABLE, data_folder
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
@@ -93,10 +93,33 @@ def _lines(path: Path) -> list[str]:
 
 
 def gpu_adapters() -> dict[str, Any]:
-    """Vulkan adapters, and why there are none if so."""
-    found, problem = vulkan.adapters()
-    note = 'for clothsim.collision.detect(..., device="gpu"); simulations detect on the CPU'
-    return {"adapters": found, "note": note if not problem else f"{problem}; {note}"}
+    """Adapters with their limits, which of them each device takes, and what is wrong if there are none."""
+    found, problem = adapters()
+    taken = {device: next((a["name"] for a in found if device in a["devices"]), "cpu") for device in ("gpu", "auto")}
+    if taken["gpu"] == "cpu":
+        taken["gpu"] = "none"
+    return {"adapters": found, "problem": problem, "taken": taken}
+
+
+def _gpu_rows(gpu: dict[str, Any]) -> list[tuple[str, str]]:
+    """Two lines for each adapter, and one for what is taken."""
+    rows = []
+    for a in gpu["adapters"]:
+        extras = [name for name in ("subgroups", "timestamps") if a[name]]
+        rows.append(("GPU", f"{a['name']}, {a['kind']}"))
+        limits = [
+            f"arrays to {a['max_binding_bytes'] / 2**20:.0f} MiB",
+            f"workgroup memory {a['workgroup_bytes'] / 1024:.0f} KiB",
+            f"{a['max_workgroups']} workgroups per dimension",
+        ]
+        rows.append(("", ", ".join(limits + extras)))
+        if a["problem"]:
+            rows.append(("", f"cannot be used: {a['problem']}"))
+    if gpu["problem"]:
+        rows.append(("GPU", gpu["problem"]))
+    auto = "the CPU" if gpu["taken"]["auto"] == "cpu" else gpu["taken"]["auto"]
+    rows.append(("", f'device "gpu" takes {gpu["taken"]["gpu"]}; device "auto" takes {auto}'))
+    return rows
 
 
 def _text(facts: dict[str, Any]) -> str:
@@ -108,8 +131,7 @@ def _text(facts: dict[str, Any]) -> str:
         ("processor", f"{processor['model']}; {' '.join(processor['features']) or 'no features listed'}"),
         ("threads", f"{facts['threads']}; memory {facts['memory_gib']} GiB"),
     ]
-    adapters = [("GPU", f"{a['name']} ({a['type']}, {a['api']})") for a in facts["gpu"]["adapters"]]
-    rows += [*adapters, ("" if adapters else "GPU", facts["gpu"]["note"])]
+    rows += _gpu_rows(facts["gpu"])
     for name, purpose in _OPTIONAL.items():
         version = facts["packages"][name]
         rows.append((name, f"{version or 'not installed'}  ({purpose})"))

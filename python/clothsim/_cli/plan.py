@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
+from clothsim._cli.device import add_device
 from clothsim.errors import IntersectingStart
 from clothsim.scene import Scene
 from clothsim.simulation import Simulation
@@ -19,6 +20,7 @@ EXAMPLE = "clothsim plan examples/drape.toml"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The scene."""
     parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
+    add_device(parser)
 
 
 def execute(options: argparse.Namespace) -> int:
@@ -26,9 +28,9 @@ def execute(options: argparse.Namespace) -> int:
     scene = Scene.load(options.scene)
     warning = ""
     try:
-        plan = Simulation(scene).plan
+        plan = Simulation(scene, device=options.device).plan
     except IntersectingStart as error:
-        plan = Simulation(scene, allow_intersections=True).plan
+        plan = Simulation(scene, device=options.device, allow_intersections=True).plan
         warning = str(error)
         plan["warnings"] = [*plan["warnings"], warning]
     print(json.dumps(plan) if options.json else str(plan).rstrip())

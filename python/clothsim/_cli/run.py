@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from clothsim._cli.device import add_device
 from clothsim._device import check_device, check_threads
 from clothsim._run.job import Job, Stopped
 from clothsim.scene import Scene
@@ -26,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--threads", metavar="N", type=_count, help="how many threads (default: all); results do not depend on it"
     )
-    parser.add_argument("--device", default="auto", help="where to detect collisions: cpu or auto (default)")
+    add_device(parser)
     parser.add_argument("--frames", metavar="N", type=_count, help="stop after N frames (default: the whole duration)")
     parser.add_argument(
         "--allow-intersections",
@@ -72,7 +73,8 @@ def execute(options: argparse.Namespace) -> int:
     try:
         report = job.run()
     except Stopped as stop:
-        again = f"clothsim run {options.scene} -o {options.out} --resume"
+        device = "" if options.device == "auto" else f" --device {options.device}"
+        again = f"clothsim run {options.scene} -o {options.out}{device} --resume"
         if options.json:
             print(json.dumps({"stopped": str(stop), "frames": stop.frames, "of": stop.total, "resume": again}))
         print(

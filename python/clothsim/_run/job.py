@@ -14,12 +14,18 @@ from typing import Any
 
 import numpy as np
 
-from clothsim import _core
 from clothsim._device import check_device
 from clothsim._run.facts import FrameFacts
 from clothsim._run.folder import RunFolder, digest
 from clothsim._run.outputs import Outputs, check_packages
-from clothsim.errors import CheckpointError, OutputExists, SimulationDiverged, SimulationStuck, SolverFailed
+from clothsim.errors import (
+    CheckpointError,
+    DeviceError,
+    OutputExists,
+    SimulationDiverged,
+    SimulationStuck,
+    SolverFailed,
+)
 from clothsim.recording import FrameWriter, Recording
 from clothsim.scene import Scene
 from clothsim.simulation import Simulation, frame_lengths, moving_positions, progress_bar, standing_positions
@@ -81,6 +87,8 @@ class Job:
             After a signal; ``resume`` goes on.
         OutputExists
             The folder holds a run, and neither ``resume`` nor ``overwrite`` is set.
+        DeviceError
+            After a checkpoint; ``resume`` goes on, on any device.
         """
         check_device(self.device)
         settings = self.scene.output
@@ -202,6 +210,10 @@ class Job:
                     except (SimulationDiverged, SimulationStuck, SolverFailed) as failure:
                         error = failure
                         break
+                    except DeviceError as failure:
+                        checkpoint()
+                        kept = f"{failure}; the frames so far are kept, and --resume goes on with them on any device"
+                        raise DeviceError(kept, device=failure.device) from failure
                     # A signal during a frame's last step comes through after it: then the frame is complete.
                     if not stopped or (core.step_count > before and not core.interrupted):
                         positions = moving_positions(bodies, simulation.positions, simulation.collider_positions)
@@ -230,7 +242,7 @@ class Job:
                 f"{self.out}: the unfinished run is of another scene, or the scene or one of its meshes has changed; "
                 "--overwrite starts anew"
             )
-        return header, Simulation._over(_core.Simulation.resume(engine, self.threads))
+        return header, Simulation._from_bytes(engine, self.threads, self.device)
 
 
 class _Signals:

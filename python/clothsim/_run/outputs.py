@@ -132,6 +132,8 @@ class Outputs:
             "python": platform.python_version(),
             "machine": platform.machine(),
             "threads": summary["threads"],
+            "detection": summary["detection"],
+            "fallbacks": summary["fallbacks"],
             "scene_digest": self._scene_digest,
             "error": None if self._error is None else f"{type(self._error).__name__}: {self._error}",
             "simulated_seconds": self._simulation.time,

@@ -92,8 +92,9 @@ impl Adaptation {
         self.since_alone += 1;
         let is_worse = cost > self.first && matches!(self.rule, Frames::Adaptive { .. });
         if is_worse {
+            let fewer = (self.frames - 1).max(1);
             self.session_ends();
-            self.frames = self.frames.saturating_sub(1).max(1);
+            self.frames = self.frames.min(fewer);
             self.is_growing = false;
         }
         is_worse
@@ -195,7 +196,7 @@ mod tests {
     #[test]
     fn a_frame_dearer_than_a_new_session_ends_it() {
         let mut adaptation = Adaptation::new(RULE);
-        adaptation.frame_alone(8.0, true);
+        adaptation.frame_alone(80.0, true);
         adaptation.first_frame(10.0);
         assert!(!adaptation.further_frame(10.0));
         assert!(adaptation.further_frame(10.5));

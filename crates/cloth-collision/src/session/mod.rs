@@ -8,37 +8,38 @@
 //! where that happened ([`dangling`]), which registers its pairs anew. So the list is complete for the balls at all times,
 //! whatever the motion, and the contacts are those of [`crate::Bvh`], bit for bit.
 //!
+//! A block of the tree that certainly does not meet itself ([`flat`]) is not traversed against itself.
+//!
 //! Nothing of a session is part of an answer: a session that starts in any frame finds the same contacts.
 //!
 //! Source: \[wong2010\].
 
 mod adapt;
+mod contour;
 mod dangling;
 mod distance;
 mod every_frame;
+mod flat;
+mod frame;
 mod options;
 mod pairs;
 mod room;
+mod stages;
 mod stats;
 mod work;
 
-use crate::bvh::leaf_pair;
-use crate::bvh::narrow::{Narrow, Scene, merge};
 use crate::bvh::refit::Boxes;
-use crate::bvh::traverse::{Candidates, Sink, Streaming, TraverseCounts, traverse};
 use crate::{Body, Bvh, CollisionMesh, Contacts, DetectError, Detector, Query, Vec3};
 use adapt::{Adaptation, Plan};
-use dangling::{Upwards, ball_box, one_by_one, one_by_one_tests};
-use pairs::{FrontEnd, Pairs, Register};
+use contour::Contours;
+use dangling::Upwards;
+use pairs::Pairs;
 use room::{Reach, Room, Weights};
 use std::time::Instant;
 use work::Work;
 
 pub use options::{Adapt, Frames, MOST_FRAMES, SessionOptions, Variant};
 pub use stats::{FrameKind, SessionStats};
-
-/// A session in which more than this share of the leaves dangles in one frame starts anew.
-const MOST_DANGLING: f64 = 0.25;
 
 /// Detector for a sequence of frames; see the module's head.
 ///
@@ -54,6 +55,7 @@ pub struct SkippingSession {
     running: Option<Running>,
     boxes: Boxes<1>,
     upwards: Option<Upwards>,
+    contours: Option<Contours>,
     reach: Reach,
     /// Tests per dangling leaf when last met one by one, and all at once.
     tests_per_leaf: [Option<f64>; 2],
@@ -88,6 +90,7 @@ impl SkippingSession {
             running: None,
             boxes: Boxes::default(),
             upwards: None,
+            contours: None,
             reach: Reach::default(),
             tests_per_leaf: [None; 2],
             stats: SessionStats::default(),
@@ -151,132 +154,6 @@ impl SkippingSession {
         }
     }
 
-    /// The first frame's tree update and traversal; None if the motion leaves no room for a session.
-    fn start(
-        &mut self,
-        mesh: &CollisionMesh,
-        query: &Query<'_>,
-        (frames, weights): (u32, Weights),
-        work: &mut Work,
-        pool: &rayon::ThreadPool,
-    ) -> Option<Running> {
-        let start = Instant::now();
-        let room = Room::new(mesh, query, weights, pool)?;
-        let tree = &self.bvh.tree;
-        let of_vertex = |v: usize| ball_box(&room.middles[v], room.radii[v], room.thickness);
-        self.boxes.refit(tree, mesh, of_vertex, None, pool);
-        work.updated(mesh.vertex_count, tree.block_count());
-        let updated = Instant::now();
-        let register =
-            || Streaming::new(Register::new(mesh, &room.middles, &room.radii, None, room.thickness));
-        let (visits, counts) = traverse(tree, &self.boxes, mesh, pool, register);
-        let mut pairs = Pairs::default();
-        take_registered(visits, counts, &mut pairs, work);
-        self.stats.update_seconds += (updated - start).as_secs_f64();
-        self.stats.traversal_seconds += updated.elapsed().as_secs_f64();
-        // A room smaller than asked for lasts less long.
-        let lasting = room.alpha as u32 + 1;
-        let frames = if room.alpha < weights.alpha { frames.min(lasting) } else { frames };
-        Some(Running { room, pairs, frames, frames_left: frames - 1, signature: 0 })
-    }
-
-    /// Gives dangling vertices other balls and registers their pairs anew; false if a new session is cheaper.
-    fn take_in_dangling(
-        &mut self,
-        mesh: &CollisionMesh,
-        query: &Query<'_>,
-        running: &mut Running,
-        work: &mut Work,
-        pool: &rayon::ThreadPool,
-    ) -> bool {
-        let start = Instant::now();
-        let tree = &self.bvh.tree;
-        let upwards = self.upwards.get_or_insert_with(|| Upwards::new(tree, mesh));
-        let leaves = upwards.leaves(&self.reach.dangling);
-        if leaves.len() as f64 > MOST_DANGLING * tree.leaves.len() as f64 {
-            return false;
-        }
-        let mut marked = vec![false; mesh.vertex_count];
-        self.reach.dangling.iter().for_each(|&v| marked[v as usize] = true);
-        running.room.move_balls(mesh, query, &mut self.reach, running.frames_left);
-        running.pairs.remove(mesh, &marked);
-        work.elementary(0, running.pairs.len() as u64, 0, 0);
-        let Room { middles, radii, thickness, .. } = &running.room;
-        let (triangles, fitted) = upwards.refit(
-            &mut self.boxes,
-            tree,
-            mesh,
-            (middles, radii, *thickness),
-            &self.reach.dangling,
-            &leaves,
-        );
-        work.updated(self.reach.dangling.len(), fitted as usize);
-        self.stats.dangling_vertices = self.reach.dangling.len() as u64;
-        self.stats.dangling_triangles = triangles;
-        let updated = Instant::now();
-        let register = || Streaming::new(Register::new(mesh, middles, radii, Some(&marked), *thickness));
-        let expected = |tests: Option<f64>| tests.map(|t| (t * leaves.len() as f64) as u64);
-        let one = expected(self.tests_per_leaf[0]).unwrap_or(one_by_one_tests(tree, leaves.len()));
-        let all = expected(self.tests_per_leaf[1]).unwrap_or(tree.block_count() as u64);
-        self.stats.one_by_one = one < all;
-        let (visits, counts) = if self.stats.one_by_one {
-            let (mut candidates, mut sink, mut counts) =
-                (Candidates::default(), register().sink, TraverseCounts::default());
-            counts.box_tests = one_by_one(tree, &self.boxes, mesh, &leaves, |a, b| {
-                counts.leaf_pairs += 1;
-                leaf_pair::features(tree, &self.boxes, a, b, &mut candidates);
-                sink.take(&mut candidates);
-            });
-            (vec![Streaming::new(sink)], counts)
-        } else {
-            traverse(tree, &self.boxes, mesh, pool, register)
-        };
-        let which = usize::from(!self.stats.one_by_one);
-        self.tests_per_leaf[which] = Some(counts.box_tests as f64 / leaves.len().max(1) as f64);
-        take_registered(visits, counts, &mut running.pairs, work);
-        self.stats.update_seconds += (updated - start).as_secs_f64();
-        self.stats.traversal_seconds += updated.elapsed().as_secs_f64();
-        true
-    }
-
-    /// Both filters on the pending list.
-    fn elementary(
-        &mut self,
-        mesh: &CollisionMesh,
-        query: &Query<'_>,
-        running: &Running,
-        work: &mut Work,
-        pool: &rayon::ThreadPool,
-    ) -> Contacts {
-        let start = Instant::now();
-        let scene = Scene::new_in(mesh, query, pool);
-        let front_end = FrontEnd {
-            mesh,
-            reach: &self.reach.of_vertex,
-            largest: self.reach.largest,
-            thickness: query.thickness,
-        };
-        let decide = |mut candidates: Candidates| {
-            let mut narrow = Narrow::new(&scene);
-            let admissible = candidates.vertex_triangle.len() + candidates.edge_edge.len();
-            narrow.take(&mut candidates);
-            (narrow, admissible as u64)
-        };
-        let parts = front_end.run(&running.pairs, decide, pool);
-        self.stats.admissible = parts.iter().map(|p| p.1).sum();
-        let out = merge(parts.into_iter().map(|p| p.0));
-        self.stats.pending = running.pairs.len() as u64;
-        self.stats.pair_bytes = running.pairs.bytes() as u64;
-        work.elementary(
-            mesh.vertex_count,
-            self.stats.pending,
-            self.stats.admissible,
-            out.stats.root_searches,
-        );
-        self.stats.elementary_seconds = start.elapsed().as_secs_f64();
-        out
-    }
-
     /// One frame, inside a session or as the first of one.
     fn frame(
         &mut self,
@@ -289,7 +166,7 @@ impl SkippingSession {
         let mut is_same_frame = false;
         let start = Instant::now();
         if let Some(session) = &mut running {
-            session.room.reach(mesh, query, &mut self.reach, pool);
+            session.room.reach(mesh, query, false, &mut self.reach, pool);
             is_same_frame = self.reach.signature == session.signature;
             self.stats.update_seconds += start.elapsed().as_secs_f64();
             if !is_same_frame && session.frames_left == 0
@@ -313,12 +190,12 @@ impl SkippingSession {
                 let weights = Weights { alpha, beta, gamma };
                 running = self.start(mesh, query, (frames, weights), &mut work, pool);
             }
-            let Some(session) = &running else {
+            let Some(session) = &mut running else {
                 self.stats.kind = FrameKind::Alone;
                 return self.alone(mesh, query, is_planned, pool);
             };
             let start = Instant::now();
-            session.room.reach(mesh, query, &mut self.reach, pool);
+            session.room.reach(mesh, query, true, &mut self.reach, pool);
             self.stats.update_seconds += start.elapsed().as_secs_f64();
             self.stats.kind = FrameKind::First;
         }
@@ -352,18 +229,6 @@ impl SkippingSession {
         self.running = (!has_better_end).then_some(session);
         Ok(out)
     }
-}
-
-fn take_registered(
-    visits: Vec<Streaming<Register<'_>>>,
-    counts: TraverseCounts,
-    pairs: &mut Pairs,
-    work: &mut Work,
-) {
-    let sinks: Vec<Register<'_>> = visits.into_iter().map(|v| v.sink).collect();
-    let distance_tests = sinks.iter().map(|s| s.distance_tests).sum();
-    pairs.append(&sinks.into_iter().map(|s| s.pairs).collect::<Vec<_>>());
-    work.traversed(counts, distance_tests);
 }
 
 impl Detector for SkippingSession {

@@ -3,10 +3,12 @@
 //! d_e(P) = (α v + β v′) Δt + γ t′, with v the vertex' speed, v′ the mean speed of its body and t′ the mean edge length of
 //! the dynamic bodies. The vertex' own part α v Δt has a direction: with the step v Δt of the first frame the path is from x to
 //! x + (1+α) v Δt. The ball lies about its middle, where half the radius covers the same path:
-//! e = ½(1+α) v Δt + β v′Δt + γ t′. What has moved by more than its ball allows *dangles*. That is decided by
+//! e = ½(1+α) v Δt + β v′Δt + γ t′. Speeds are relative to the rigid motion of the whole scene ([`super::frame`]), if that makes
+//! them less. What has moved by more than its ball allows *dangles*. That is decided by
 //! the position itself, at both ends of every step, so that no change of speed can lose a contact.
 
 use super::distance::Row;
+use super::frame::{Following, Frame};
 use crate::bounds::middle;
 use crate::{CollisionMesh, Query, Vec3};
 use cloth_mesh::NONE;
@@ -14,7 +16,7 @@ use rayon::prelude::*;
 
 /// Mean radius, in mean edge lengths, up to which sessions pay: α is lowered to that, and without α a frame beyond
 /// it stands alone.
-const MOST_ROOM: f64 = 0.75;
+const MOST_ROOM: f64 = 0.35;
 /// Radius, in mean edge lengths, beyond which the path of a single vertex is not followed further than its present step.
 const MOST_LEAD: f64 = 2.0;
 /// Coordinates beyond this [m], relative to the middle of the scene, stay out of single precision's squares.
@@ -26,7 +28,7 @@ const CHUNK: usize = 4096;
 /// Widens a length for its narrowing to single precision.
 const WIDER: f64 = 1.0 + 1.0 / (1 << 22) as f64;
 /// Of the coordinates of a difference: several roundings in double precision.
-const ROUNDING: f64 = 8.0 * f64::EPSILON;
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
 /// α, β, γ.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +53,9 @@ pub(super) struct Room {
     slack: Vec<f64>,
     /// Longer paths are followed for the present step only [m].
     most_lead: f64,
+    is_following: bool,
+    /// The scene's rigid motion in the present step.
+    following: Following,
 }
 
 /// How far the vertices are from the middles of their balls during a step.
@@ -76,21 +81,19 @@ impl Room {
     ) -> Option<Self> {
         let Query { x_t0, x_t1, .. } = *query;
         let origin = middle(x_t0);
-        let steps = Steps::new(mesh, query, &origin, pool);
+        let before = |v: usize| x_t0[v] - origin;
+        let following = Following::fit(mesh, before, &origin, [x_t0, x_t1], &Frame::at_rest());
+        let steps = Steps::new(mesh, query, &origin, &following, pool);
         if !(steps.extent < FARTHEST) {
             return None;
         }
+        let is_following = steps.is_less_following;
+        let following = if is_following { following } else { Following::none() };
         let edge = mean_edge(mesh, x_t1);
-        let slack: Vec<f64> =
-            (0..mesh.bodies.len())
-                .map(|b| {
-                    if steps.mean[b] > 0.0 {
-                        weights.beta * steps.mean[b] + weights.gamma * edge
-                    } else {
-                        0.0
-                    }
-                })
-                .collect();
+        // What does not move at all needs no room; a frame that is followed comes with its rounding.
+        let moves = |mean: f64| is_following || mean > 0.0;
+        let slack_of = |mean: f64| if moves(mean) { weights.beta * mean + weights.gamma * edge } else { 0.0 };
+        let slack: Vec<f64> = steps.mean.iter().map(|&mean| slack_of(mean)).collect();
         // Mean over the dynamic vertices of ½(1+α) v Δt + slack ≤ most.
         let weigh = |of_body: &dyn Fn(usize) -> f64| {
             let counted: f64 = steps.count.iter().map(|&n| n as f64).sum();
@@ -113,6 +116,8 @@ impl Room {
             radii: vec![0.0; x_t0.len()],
             slack,
             most_lead: MOST_LEAD * edge,
+            is_following,
+            following,
         };
         let (mut middles, mut radii) = (std::mem::take(&mut room.middles), std::mem::take(&mut room.radii));
         pool.install(|| {
@@ -130,29 +135,51 @@ impl Room {
     /// Middle and radius of the ball around the path of a vertex over (1+α) steps like that of `query`.
     #[inline]
     fn ball(&self, mesh: &CollisionMesh, query: &Query<'_>, v: usize, alpha: f64) -> (Row, f32) {
-        let (x_t0, x_t1) = (&query.x_t0[v], &query.x_t1[v]);
-        let step = x_t1 - x_t0;
+        let (x_t0, x_t1) = (query.x_t0[v] - self.origin, query.x_t1[v] - self.origin);
+        let [first, second] = &self.following.ends;
+        let start = first.back(x_t0);
+        let step = second.back(x_t1) - start;
         let length = step.norm();
         let mut lead = 0.5 * (1.0 + alpha);
         if !(lead * length <= self.most_lead) {
             lead = 0.5;
         }
-        let middle = x_t0 - self.origin + step * lead;
+        let middle = start + step * lead;
         let row = [middle.x as f32, middle.y as f32, middle.z as f32, 0.0];
         let room = lead * length + self.slack[mesh.vertex_body[v] as usize];
-        let now = distance(x_t0, &self.origin, &row).max(distance(x_t1, &self.origin, &row));
+        let now = self.distance(&x_t0, first, &row).max(self.distance(&x_t1, second, &row));
         (row, ((room * WIDER) as f32).max(now))
     }
 
-    /// Where the vertices of `query` are in their balls.
+    /// Distance [m] of a position from where the frame takes a ball's middle, rounded up, with its share of what a frame that
+    /// shortens lengths to s of them takes from a pair: s D > a + b + δ is D > a/s + b/s + δ + δ(1/s − 1).
+    #[inline]
+    fn distance(&self, x: &Vec3, frame: &Frame, row: &Row) -> f32 {
+        let middle = Vec3::new(f64::from(row[0]), f64::from(row[1]), f64::from(row[2]));
+        let d = x - frame.apply(middle);
+        let size = |p: &Vec3| p.x.abs() + p.y.abs() + p.z.abs();
+        let rounding = ROUNDING * (size(x) + size(&middle) + frame.size());
+        let longer = 1.0 / self.following.scale;
+        let share = d.norm() * longer + 0.5 * self.thickness * (longer - 1.0);
+        (share * WIDER + rounding + f64::from(f32::MIN_POSITIVE)) as f32
+    }
+
+    /// Where the vertices of `query` are in their balls. `is_first`: the balls were made for it.
     pub(super) fn reach(
-        &self,
+        &mut self,
         mesh: &CollisionMesh,
         query: &Query<'_>,
+        is_first: bool,
         out: &mut Reach,
         pool: &rayon::ThreadPool,
     ) {
         let is_moving = query.mode == crate::Mode::Continuous;
+        if self.is_following && !is_first {
+            let middles = |v: usize| Vec3::from([0, 1, 2].map(|k| f64::from(self.middles[v][k])));
+            let start = &self.following.ends[1];
+            self.following = Following::fit(mesh, middles, &self.origin, [query.x_t0, query.x_t1], start);
+        }
+        let room = &*self;
         out.of_vertex.resize(self.radii.len(), 0.0);
         let parts: Vec<(Vec<u32>, f32, u64)> = pool.install(|| {
             let chunks = out.of_vertex.par_chunks_mut(CHUNK).enumerate();
@@ -164,14 +191,15 @@ impl Room {
                         if mesh.vertex_owner[v] == NONE {
                             continue;
                         }
-                        let (start, row) = (&query.x_t0[v], &self.middles[v]);
-                        let mut far = distance(&query.x_t1[v], &self.origin, row);
+                        let [first, second] = &room.following.ends;
+                        let (start, row) = (&query.x_t0[v], &room.middles[v]);
+                        let mut far = room.distance(&(query.x_t1[v] - room.origin), second, row);
                         if is_moving {
-                            far = far.max(distance(start, &self.origin, row));
+                            far = far.max(room.distance(&(start - room.origin), first, row));
                         }
                         *reach = far;
                         largest = largest.max(far);
-                        if far > self.radii[v] {
+                        if far > room.radii[v] {
                             dangling.push(v as u32);
                         }
                         // Any mixing that no ordinary motion undoes.
@@ -203,72 +231,77 @@ impl Room {
         for &v in &reach.dangling {
             let k = v as usize;
             (self.middles[k], self.radii[k]) = self.ball(mesh, query, k, f64::from(steps_left));
-            let row = &self.middles[k];
-            reach.of_vertex[k] =
-                distance(&query.x_t0[k], &self.origin, row).max(distance(&query.x_t1[k], &self.origin, row));
+            let (row, [first, second]) = (&self.middles[k], &self.following.ends);
+            let at = |x: &[Vec3], frame| self.distance(&(x[k] - self.origin), frame, row);
+            reach.of_vertex[k] = at(query.x_t0, first).max(at(query.x_t1, second));
         }
         reach.largest = reach.of_vertex.iter().copied().fold(0.0, f32::max);
     }
 }
 
-/// Distance [m] of a position from a ball's middle, rounded up.
-#[inline]
-fn distance(x: &Vec3, origin: &Vec3, row: &Row) -> f32 {
-    let p = x - origin;
-    let d = [0, 1, 2].map(|k| p[k] - f64::from(row[k]));
-    let size = p.x.abs() + p.y.abs() + p.z.abs();
-    let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-    ((length * WIDER) + ROUNDING * size + f64::from(f32::MIN_POSITIVE)) as f32
-}
+/// Of some vertices of a body: how many, and their steps' lengths, as they are and relative to the frames [m].
+type Lengths = (usize, [f64; 2]);
 
 /// The steps of the bodies' vertices.
 struct Steps {
     /// Vertices on a surface, 0 for a body that is not dynamic.
     count: Vec<usize>,
-    /// Mean length of a step of each body [m].
+    /// Mean length of a step of each body [m], relative to the frames if that is less over all.
     mean: Vec<f64>,
+    is_less_following: bool,
     /// Largest coordinate at both ends, relative to the origin [m].
     extent: f64,
 }
 
 impl Steps {
-    fn new(mesh: &CollisionMesh, query: &Query<'_>, origin: &Vec3, pool: &rayon::ThreadPool) -> Self {
+    fn new(
+        mesh: &CollisionMesh,
+        query: &Query<'_>,
+        origin: &Vec3,
+        following: &Following,
+        pool: &rayon::ThreadPool,
+    ) -> Self {
         let bodies = mesh.bodies.len();
         let chunk_count = mesh.vertex_count.div_ceil(CHUNK);
-        let parts: Vec<(Vec<(usize, f64)>, f64)> = pool.install(|| {
-            let of_chunk = |chunk: usize| {
-                let (mut sums, mut extent) = (vec![(0, 0.0); bodies], 0.0f64);
-                for v in chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.vertex_count) {
-                    if mesh.vertex_owner[v] == NONE {
-                        continue;
-                    }
-                    let sum = &mut sums[mesh.vertex_body[v] as usize];
-                    sum.0 += 1;
-                    sum.1 += (query.x_t1[v] - query.x_t0[v]).norm();
-                    for x in [&query.x_t0[v], &query.x_t1[v]] {
-                        let d = x - origin;
-                        extent = extent.max(d.x.abs()).max(d.y.abs()).max(d.z.abs());
-                    }
+        let [first, second] = &following.ends;
+        let of_chunk = |chunk: usize| {
+            let (mut sums, mut extent) = (vec![(0, [0.0; 2]); bodies], 0.0f64);
+            for v in chunk * CHUNK..((chunk + 1) * CHUNK).min(mesh.vertex_count) {
+                if mesh.vertex_owner[v] == NONE {
+                    continue;
                 }
-                (sums, extent)
-            };
-            (0..chunk_count).into_par_iter().map(of_chunk).collect()
-        });
-        let (mut count, mut mean, mut extent) = (vec![0; bodies], vec![0.0; bodies], 0.0f64);
-        for (sums, part) in parts {
-            for (b, (n, sum)) in sums.into_iter().enumerate() {
+                let (x_t0, x_t1) = (query.x_t0[v] - origin, query.x_t1[v] - origin);
+                let (count, lengths) = &mut sums[mesh.vertex_body[v] as usize];
+                *count += 1;
+                lengths[0] += (x_t1 - x_t0).norm();
+                lengths[1] += (second.back(x_t1) - first.back(x_t0)).norm();
+                for d in [x_t0, x_t1] {
+                    extent = extent.max(d.x.abs()).max(d.y.abs()).max(d.z.abs());
+                }
+            }
+            (sums, extent)
+        };
+        let parts: Vec<(Vec<Lengths>, f64)> =
+            pool.install(|| (0..chunk_count).into_par_iter().map(of_chunk).collect());
+        let (mut count, mut sums, mut extent) = (vec![0; bodies], vec![[0.0; 2]; bodies], 0.0f64);
+        for (of_bodies, part) in parts {
+            for (b, (n, lengths)) in of_bodies.into_iter().enumerate() {
                 count[b] += n;
-                mean[b] += sum;
+                sums[b][0] += lengths[0];
+                sums[b][1] += lengths[1];
             }
             extent = extent.max(part);
         }
+        let total = |k: usize| sums.iter().map(|s| s[k]).sum::<f64>();
+        let is_less_following = total(1) < total(0);
+        let mean =
+            (0..bodies).map(|b| sums[b][usize::from(is_less_following)] / count[b].max(1) as f64).collect();
         for b in 0..bodies {
-            mean[b] /= count[b].max(1) as f64;
             if !mesh.bodies[b].dynamic {
                 count[b] = 0;
             }
         }
-        Self { count, mean, extent }
+        Self { count, mean, is_less_following, extent }
     }
 }
 

@@ -87,3 +87,32 @@ pub(crate) fn bodies(random: &mut Random) -> (CollisionMesh, Vec<Vec3>) {
     }
     (mesh, parts.into_iter().flat_map(|p| p.0).collect())
 }
+
+/// Frames along a path, each step starting where the last one ended.
+pub(crate) fn along(count: usize, position: impl Fn(usize) -> Vec<Vec3>) -> Vec<[Vec<Vec3>; 2]> {
+    (0..count).map(|k| [position(k), position(k + 1)]).collect()
+}
+
+/// Two sheets of unit size, one above the other; the upper one rests on the lower one's waves.
+pub(crate) fn layers(n: usize, random: &mut Random) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let (mut x, mut triangles) = sheet(n, random);
+    let (count, lower) = (x.len() as u32, triangles.clone());
+    x.extend_from_within(..);
+    for v in &mut x[count as usize..] {
+        v.y += 0.015;
+        v.x += 0.3 / n as f64;
+    }
+    triangles.extend(lower.iter().map(|t| t.map(|v| v + count)));
+    (x, triangles)
+}
+
+/// A coherent motion: waves that travel through the layers, and a slow drift.
+pub(crate) fn waves(x: &[Vec3], speed: f64) -> impl Fn(usize) -> Vec<Vec3> + '_ {
+    move |k| {
+        let time = speed * k as f64;
+        let wave = |p: &Vec3| {
+            Vec3::new(0.2 * time, 0.01 * (9.0 * p.x + 40.0 * time).sin() * (7.0 * p.z).cos(), 0.1 * time)
+        };
+        x.iter().enumerate().map(|(v, p)| p + wave(p) * if v % 2 == 0 { 1.0 } else { 1.1 }).collect()
+    }
+}

@@ -104,7 +104,7 @@ pub fn cells_gather(registrations: &[(u64, u32)], spheres: &[[f32; 4]], controls
     let entry = |&(key, t): &(u64, u32)| {
         let [x, y, z, radius] = spheres[t as usize];
         let control = controls[t as usize];
-        Entry { centre: [x, y, z], radius, triangle: t, control, key: key as u32, pad: 0 }
+        Entry { centre: [x, y, z], radius, triangle: t, control, key: key as u32, level: 0 }
     };
     registrations.iter().map(entry).collect()
 }

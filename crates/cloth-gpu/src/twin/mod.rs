@@ -6,6 +6,7 @@ pub mod cells;
 pub mod compact;
 pub mod features;
 pub mod grid;
+pub mod octree;
 pub mod pairs;
 pub mod scan;
 pub mod sort;

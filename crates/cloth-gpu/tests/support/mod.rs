@@ -5,8 +5,9 @@
 
 pub(crate) mod npz;
 
+use bytemuck::Pod;
 use cloth_gpu::collision::{Body, CollisionMesh, Contacts, Vec3};
-use cloth_gpu::{Gpu, GpuError, GpuOptions};
+use cloth_gpu::{Array, Gpu, GpuError, GpuOptions, Recorder};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -45,6 +46,18 @@ pub(crate) fn variants() -> [GpuOptions; 4] {
         GpuOptions { max_workgroups_per_dimension: Some(24), ..plain },
         GpuOptions { shader_checks: false, ..plain },
     ]
+}
+
+/// Copies an array back.
+pub(crate) fn whole<T: Pod>(recorder: &mut Recorder<'_>, array: &Array<T>) -> usize {
+    recorder.download(array, 0..array.capacity())
+}
+
+/// The first n elements.
+pub(crate) fn first<T>(mut list: Vec<T>, n: usize) -> Vec<T> {
+    assert!(n <= list.len(), "{n} in {}", list.len());
+    list.truncate(n);
+    list
 }
 
 /// SplitMix64.

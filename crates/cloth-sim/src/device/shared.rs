@@ -1,14 +1,18 @@
 //! One open GPU for many calls.
 
-use super::{CPU_DEFAULT, Detected, Device, DeviceError, Reason, detect_on_cpu};
-use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, Query};
-use crate::gpu::{AdapterChoice, Gpu, GpuError, GpuOptions, GridGpu};
-use std::sync::{Arc, Mutex, PoisonError};
+use super::methods::Kept;
+use super::{CPU_DEFAULT, Detected, Device, DeviceError, Reason, Tuning, detect_on_cpu, hardware};
+use crate::collision::{CollisionMesh, DetectError, Query};
+use crate::gpu::{AdapterChoice, Gpu, GpuError, GpuOptions};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A GPU that is opened when it is first wanted and kept. Its calls compute one after the other, so that a failure belongs to one.
 #[derive(Debug)]
 pub struct SharedGpu {
-    takes_software: bool,
+    takes_software: AtomicBool,
+    /// None: the defaults.
+    options: Option<GpuOptions>,
     state: Mutex<State>,
 }
 
@@ -16,20 +20,21 @@ pub struct SharedGpu {
 struct State {
     /// The process that opened it: a forked one inherits the memory, not the driver's threads.
     process: u32,
-    gpu: Option<Arc<Gpu>>,
+    open: Option<Open>,
     /// What the search for a GPU that is no software adapter found, if it found none.
     no_hardware: Option<String>,
 }
 
+/// An open GPU.
+#[derive(Debug)]
+pub(super) struct Open {
+    pub(super) gpu: Arc<Gpu>,
+    pub(super) kept: Kept,
+}
+
 impl State {
     const fn new(process: u32) -> Self {
-        Self { process, gpu: None, no_hardware: None }
-    }
-
-    fn open(&mut self, choice: AdapterChoice) -> Result<Arc<Gpu>, GpuError> {
-        let gpu = Gpu::new(GpuOptions { adapter: choice, ..GpuOptions::default() })?;
-        self.gpu = Some(gpu.clone());
-        Ok(gpu)
+        Self { process, open: None, no_hardware: None }
     }
 }
 
@@ -38,17 +43,47 @@ static OF_PROCESS: SharedGpu = SharedGpu::new(false);
 impl SharedGpu {
     /// Nothing is opened yet. With `takes_software`, [`Device::Auto`] takes a software adapter too.
     pub const fn new(takes_software: bool) -> Self {
-        Self { takes_software, state: Mutex::new(State::new(0)) }
+        Self {
+            takes_software: AtomicBool::new(takes_software),
+            options: None,
+            state: Mutex::new(State::new(0)),
+        }
     }
 
-    /// The one of [`super::detect`].
+    /// [`SharedGpu::new`] that opens devices with other options, whose choice of an adapter counts for nothing.
+    pub const fn with_options(takes_software: bool, options: GpuOptions) -> Self {
+        let mut shared = Self::new(takes_software);
+        shared.options = Some(options);
+        shared
+    }
+
+    /// The one of the process: of [`super::detect`], and of simulations unless they are given another.
     pub fn of_process() -> &'static Self {
         &OF_PROCESS
     }
 
+    /// Whether from here on [`Device::Auto`] takes a software adapter too. For tests: it is slower than the CPU.
+    pub fn set_takes_software(&self, takes: bool) {
+        self.takes_software.store(takes, Ordering::Relaxed);
+    }
+
     /// The GPU that is open, if one is.
     pub fn gpu(&self) -> Option<Arc<Gpu>> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).gpu.clone()
+        self.lock().open.as_ref().map(|open| open.gpu.clone())
+    }
+
+    /// Closes the GPU under whoever works with it, as if its driver had gone; whether one was open. For tests.
+    pub fn lose(&self) -> bool {
+        self.gpu().map(|gpu| gpu.close()).is_some()
+    }
+
+    #[cfg(test)]
+    pub(crate) fn uploads(&self) -> u64 {
+        self.lock().open.as_ref().map_or(0, |open| open.kept.built())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Detects with one of [`super::GPU_METHODS`]; for [`Device::Auto`], without a GPU, on the CPU.
@@ -60,36 +95,46 @@ impl SharedGpu {
         mesh: &CollisionMesh,
         query: &Query<'_>,
         method: &'static str,
+        tuning: &Tuning,
         device: Device,
         pool: &rayon::ThreadPool,
     ) -> Result<Detected, DeviceError> {
-        let reason = match self.attempt(mesh, query, method, device, pool) {
+        let answer = self.with(device, |open| {
+            let kept = open.kept.get(&open.gpu, mesh, method, tuning)?;
+            let contacts = kept.detect(mesh, query, pool)?;
+            let mut counts = kept.counted();
+            counts.push(("bytes", kept.bytes()));
+            Ok((contacts, counts))
+        });
+        let reason = match answer {
+            Ok(((contacts, counts), device)) => {
+                return Ok(Detected { contacts, method, device, counts, reason: None });
+            }
             Err(DeviceError::Unavailable { reason }) if device == Device::Auto => {
                 Reason::NoGpu(format!("\"{method}\": {reason}"))
             }
             Err(DeviceError::Failed { device: adapter, reason }) if device == Device::Auto => {
                 Reason::Failed(format!("\"{method}\": {adapter}: {reason}"))
             }
-            answer => return answer,
+            Err(error) => return Err(error),
         };
         detect_on_cpu(mesh, query, CPU_DEFAULT, Some(reason), pool)
     }
 
-    fn attempt(
+    /// What `work` gives on the GPU for that device, opened if it is not, and the GPU's description. Nobody else computes on it
+    /// meanwhile. A GPU that fails is closed.
+    pub(super) fn with<T>(
         &self,
-        mesh: &CollisionMesh,
-        query: &Query<'_>,
-        method: &'static str,
         device: Device,
-        pool: &rayon::ThreadPool,
-    ) -> Result<Detected, DeviceError> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let gpu = self.open(&mut state, device).map_err(|reason| DeviceError::Unavailable { reason })?;
-        let description = gpu.description();
-        match contacts(&gpu, mesh, query, method, pool) {
-            Ok(contacts) => Ok(Detected { contacts, method, device: description, reason: None }),
+        work: impl FnOnce(&mut Open) -> Result<T, DetectError>,
+    ) -> Result<(T, String), DeviceError> {
+        let mut state = self.lock();
+        let open = self.open(&mut state, device).map_err(|reason| DeviceError::Unavailable { reason })?;
+        let description = open.gpu.description();
+        match work(open) {
+            Ok(answer) => Ok((answer, description)),
             Err(DetectError::Device { reason, .. }) => {
-                state.gpu = None;
+                state.open = None;
                 Err(DeviceError::Failed { device: description, reason })
             }
             Err(error) => Err(error.into()),
@@ -97,44 +142,32 @@ impl SharedGpu {
     }
 
     /// The GPU for that device, opened if it is not, or why there is none.
-    fn open(&self, state: &mut State, device: Device) -> Result<Arc<Gpu>, String> {
+    fn open<'s>(&self, state: &'s mut State, device: Device) -> Result<&'s mut Open, String> {
         let process = std::process::id();
         if state.process != process {
             // The parent's driver must not be closed from here.
-            std::mem::forget(state.gpu.take());
+            std::mem::forget(state.open.take());
             *state = State::new(process);
         }
-        let hardware_only = device == Device::Auto && !self.takes_software;
-        match &state.gpu {
-            Some(gpu) if !(hardware_only && gpu.is_software()) => return Ok(gpu.clone()),
-            None if !hardware_only => return state.open(AdapterChoice::Any).map_err(|e| e.to_string()),
-            _ => {}
+        let hardware_only = device == Device::Auto && !self.takes_software.load(Ordering::Relaxed);
+        if hardware_only && state.open.as_ref().is_none_or(|open| open.gpu.is_software()) {
+            if state.no_hardware.is_none() {
+                match hardware::absent().map_or_else(|| self.build(AdapterChoice::Hardware), Err) {
+                    Ok(open) => return Ok(state.open.insert(open)),
+                    Err(reason) => state.no_hardware = Some(reason),
+                }
+            }
+            return Err(state.no_hardware.clone().unwrap_or_default());
         }
-        if let Some(reason) = &state.no_hardware {
-            return Err(reason.clone());
+        match &mut state.open {
+            Some(open) => Ok(open),
+            none => Ok(none.insert(self.build(AdapterChoice::Any)?)),
         }
-        state.open(AdapterChoice::Hardware).map_err(|error| {
-            let reason = error.to_string();
-            state.no_hardware = Some(reason.clone());
-            reason
-        })
     }
-}
 
-fn contacts(
-    gpu: &Arc<Gpu>,
-    mesh: &CollisionMesh,
-    query: &Query<'_>,
-    method: &'static str,
-    pool: &rayon::ThreadPool,
-) -> Result<Contacts, DetectError> {
-    let detector = match method {
-        "grid" => GridGpu::new(gpu.clone(), mesh),
-        _ => GridGpu::virtual_subdivision(gpu.clone(), mesh),
-    };
-    let mut detector = detector.map_err(|error| match error {
-        GpuError::Query(error) => error,
-        error => DetectError::Device { detector: method, reason: error.to_string() },
-    })?;
-    detector.detect(mesh, query, pool)
+    fn build(&self, adapter: AdapterChoice) -> Result<Open, String> {
+        let options = GpuOptions { adapter, ..self.options.unwrap_or_default() };
+        let gpu = Gpu::new(options).map_err(|error: GpuError| error.to_string())?;
+        Ok(Open { gpu, kept: Kept::default() })
+    }
 }

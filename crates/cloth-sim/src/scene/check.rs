@@ -1,6 +1,7 @@
 //! Value ranges and what belongs together, as far as the scene alone can tell.
 
 use super::{Cloth, Collider, ContactMethod, Keyframe, MaterialChoice, Pin, Rotation, Scene, SceneError};
+use crate::device::method_names;
 use cloth_core::{CoreError, material::library};
 
 impl Scene {
@@ -56,11 +57,12 @@ impl Scene {
             let got = format!("\"constraints\" with time.integrator = {}", quoted(&scheme));
             return Err(self.error("contact.method", CONSTRAINED, got));
         }
-        if !DETECTORS.contains(&contact.detector.as_str()) {
+        let detectors = method_names();
+        if !detectors.contains(&contact.detector.as_str()) {
             let got = format!("\"{}\"", contact.detector);
             return Err(self
-                .error("contact.detector", format!("one of {DETECTORS:?}"), got)
-                .with_nearest(&contact.detector, DETECTORS.into_iter()));
+                .error("contact.detector", format!("one of {detectors:?}"), got)
+                .with_nearest(&contact.detector, detectors.into_iter()));
         }
         Ok(())
     }
@@ -261,9 +263,6 @@ const MAX_HALVINGS: u32 = 16;
 /// What contact constraints work with.
 const CONSTRAINED: &str = "\"velocity-filter\", or \"constraints\" with one of the implicit integrators (\"implicit-euler\", \
                            \"implicit-newton\", \"semi-implicit\")";
-
-/// Names that [`cloth_collision::detector`] takes.
-const DETECTORS: [&str; 2] = ["bvh", "brute"];
 
 /// The name of a choice as a scene file writes it, in quotes.
 fn quoted(value: &impl serde::Serialize) -> String {

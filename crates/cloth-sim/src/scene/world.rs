@@ -91,7 +91,9 @@ pub struct Contact {
     pub method: ContactMethod,
     /// Distance at which surfaces rest on each other [m], > 0.
     pub thickness: f64,
-    /// Detection method: "bvh", or "brute" (every pair, the oracle).
+    /// Continuous detection: "auto" ("bvh" on the CPU, "virtual-subdivision" on a GPU), "bvh", "session" (skips tree updates in
+    /// coherent motion) or "brute" (every pair, the oracle) on the CPU, "grid", "virtual-subdivision", "octree-single" or
+    /// "octree" on a GPU. Results do not depend on it.
     pub detector: String,
     /// Whether cloth meets itself; a piece of cloth may opt out with its own `self_collision`.
     #[serde(rename = "self")]
@@ -120,7 +122,7 @@ impl Default for Contact {
         Self {
             method: ContactMethod::default(),
             thickness: response.thickness,
-            detector: "bvh".into(),
+            detector: "auto".into(),
             self_collision: true,
             friction: Friction::Coefficient(0.3),
             self_friction: Friction::Coefficient(0.2),

@@ -1,0 +1,165 @@
+//! The stages of a frame: tree update and traversal, dangling triangles, elementary tests.
+
+use super::contour::{self, Contours};
+use super::dangling::{Upwards, ball_box, one_by_one, one_by_one_tests};
+use super::pairs::{FrontEnd, Pairs, Register};
+use super::room::{Room, Weights};
+use super::work::Work;
+use super::{Running, SkippingSession, flat};
+use crate::bvh::leaf_pair;
+use crate::bvh::narrow::{Narrow, Scene, merge};
+use crate::bvh::traverse::{Candidates, Sink, Streaming, TraverseCounts, traverse};
+use crate::{CollisionMesh, Contacts, Query, Vec3};
+use std::time::Instant;
+
+/// A session in which more than this share of the leaves dangles in one frame starts anew.
+const MOST_DANGLING: f64 = 0.25;
+
+impl SkippingSession {
+    /// The first frame's tree update and traversal; None if the motion leaves no room for a session.
+    pub(super) fn start(
+        &mut self,
+        mesh: &CollisionMesh,
+        query: &Query<'_>,
+        (frames, weights): (u32, Weights),
+        work: &mut Work,
+        pool: &rayon::ThreadPool,
+    ) -> Option<Running> {
+        let start = Instant::now();
+        let room = Room::new(mesh, query, weights, pool)?;
+        let tree = &self.bvh.tree;
+        let of_vertex = |v: usize| ball_box(&room.middles[v], room.radii[v], room.thickness);
+        self.boxes.refit(tree, mesh, of_vertex, None, pool);
+        work.updated(mesh.vertex_count, tree.block_count());
+        if self.options.low_curvature {
+            let contours = self.contours.get_or_insert_with(|| Contours::new(tree, mesh));
+            let is_simple =
+                |loops: &[Vec<u32>], axis: &Vec3, position: &(dyn Fn(u32) -> Vec3 + Sync), clearance| {
+                    contour::is_simple(loops, axis, position, clearance)
+                };
+            let flat = flat::mark(&mut self.boxes, tree, mesh, &room, contours, is_simple, pool);
+            (self.stats.flat_surfaces, self.stats.flat_triangles) = (flat.surfaces, flat.triangles);
+        }
+        let updated = Instant::now();
+        let register =
+            || Streaming::new(Register::new(mesh, &room.middles, &room.radii, None, room.thickness));
+        let (visits, counts) = traverse(tree, &self.boxes, mesh, pool, register);
+        let mut pairs = Pairs::default();
+        take_registered(visits, counts, &mut pairs, work);
+        self.stats.update_seconds += (updated - start).as_secs_f64();
+        self.stats.traversal_seconds += updated.elapsed().as_secs_f64();
+        // A room smaller than asked for lasts less long.
+        let lasting = room.alpha as u32 + 1;
+        let frames = if room.alpha < weights.alpha { frames.min(lasting) } else { frames };
+        Some(Running { room, pairs, frames, frames_left: frames - 1, signature: 0 })
+    }
+
+    /// Gives dangling vertices other balls and registers their pairs anew; false if a new session is cheaper.
+    pub(super) fn take_in_dangling(
+        &mut self,
+        mesh: &CollisionMesh,
+        query: &Query<'_>,
+        running: &mut Running,
+        work: &mut Work,
+        pool: &rayon::ThreadPool,
+    ) -> bool {
+        let start = Instant::now();
+        let tree = &self.bvh.tree;
+        let upwards = self.upwards.get_or_insert_with(|| Upwards::new(tree, mesh));
+        let leaves = upwards.leaves(&self.reach.dangling);
+        if leaves.len() as f64 > MOST_DANGLING * tree.leaves.len() as f64 {
+            return false;
+        }
+        let mut marked = vec![false; mesh.vertex_count];
+        self.reach.dangling.iter().for_each(|&v| marked[v as usize] = true);
+        running.room.move_balls(mesh, query, &mut self.reach, running.frames_left);
+        running.pairs.remove(mesh, &marked);
+        work.elementary(0, running.pairs.len() as u64, 0, 0);
+        let Room { middles, radii, thickness, .. } = &running.room;
+        let (triangles, fitted) = upwards.refit(
+            &mut self.boxes,
+            tree,
+            mesh,
+            (middles, radii, *thickness),
+            &self.reach.dangling,
+            &leaves,
+        );
+        work.updated(self.reach.dangling.len(), fitted as usize);
+        self.stats.dangling_vertices = self.reach.dangling.len() as u64;
+        self.stats.dangling_triangles = triangles;
+        let updated = Instant::now();
+        let register = || Streaming::new(Register::new(mesh, middles, radii, Some(&marked), *thickness));
+        let expected = |tests: Option<f64>| tests.map(|t| (t * leaves.len() as f64) as u64);
+        let one = expected(self.tests_per_leaf[0]).unwrap_or(one_by_one_tests(tree, leaves.len()));
+        let all = expected(self.tests_per_leaf[1]).unwrap_or(tree.block_count() as u64);
+        self.stats.one_by_one = one < all;
+        let (visits, counts) = if self.stats.one_by_one {
+            let (mut candidates, mut sink, mut counts) =
+                (Candidates::default(), register().sink, TraverseCounts::default());
+            counts.box_tests = one_by_one(tree, &self.boxes, mesh, &leaves, |a, b| {
+                counts.leaf_pairs += 1;
+                leaf_pair::features(tree, &self.boxes, a, b, &mut candidates);
+                sink.take(&mut candidates);
+            });
+            (vec![Streaming::new(sink)], counts)
+        } else {
+            traverse(tree, &self.boxes, mesh, pool, register)
+        };
+        let which = usize::from(!self.stats.one_by_one);
+        self.tests_per_leaf[which] = Some(counts.box_tests as f64 / leaves.len().max(1) as f64);
+        take_registered(visits, counts, &mut running.pairs, work);
+        self.stats.update_seconds += (updated - start).as_secs_f64();
+        self.stats.traversal_seconds += updated.elapsed().as_secs_f64();
+        true
+    }
+
+    /// Both filters on the pending list.
+    pub(super) fn elementary(
+        &mut self,
+        mesh: &CollisionMesh,
+        query: &Query<'_>,
+        running: &Running,
+        work: &mut Work,
+        pool: &rayon::ThreadPool,
+    ) -> Contacts {
+        let start = Instant::now();
+        let scene = Scene::new_in(mesh, query, pool);
+        let front_end = FrontEnd {
+            mesh,
+            reach: &self.reach.of_vertex,
+            largest: self.reach.largest,
+            thickness: query.thickness,
+        };
+        let decide = |mut candidates: Candidates| {
+            let mut narrow = Narrow::new(&scene);
+            let admissible = candidates.vertex_triangle.len() + candidates.edge_edge.len();
+            narrow.take(&mut candidates);
+            (narrow, admissible as u64)
+        };
+        let parts = front_end.run(&running.pairs, decide, pool);
+        self.stats.admissible = parts.iter().map(|p| p.1).sum();
+        let out = merge(parts.into_iter().map(|p| p.0));
+        self.stats.pending = running.pairs.len() as u64;
+        self.stats.pair_bytes = running.pairs.bytes() as u64;
+        work.elementary(
+            mesh.vertex_count,
+            self.stats.pending,
+            self.stats.admissible,
+            out.stats.root_searches,
+        );
+        self.stats.elementary_seconds = start.elapsed().as_secs_f64();
+        out
+    }
+}
+
+fn take_registered(
+    visits: Vec<Streaming<Register<'_>>>,
+    counts: TraverseCounts,
+    pairs: &mut Pairs,
+    work: &mut Work,
+) {
+    let sinks: Vec<Register<'_>> = visits.into_iter().map(|v| v.sink).collect();
+    let distance_tests = sinks.iter().map(|s| s.distance_tests).sum();
+    pairs.append(&sinks.into_iter().map(|s| s.pairs).collect::<Vec<_>>());
+    work.traversed(counts, distance_tests);
+}
