@@ -1,19 +1,23 @@
-//! Primitives on the device that `GpuOptions::default()` opens, over sizes: seconds on the device where it can tell, else
-//! until the answer is back; and the methods on a folded sheet beside the tree on the CPU, until the contacts are there. Without
-//! any adapter nothing is measured.
+//! Primitives on the device that `GpuOptions::default()` opens, over sizes: seconds on the device where it can tell, else until the
+//! answer is back. Then tables: the stages on a folded sheet over sizes, and all methods on the published frames beside the
+//! tree on the processor. `cargo bench --bench gpu -- stages`, `-- scenes`, `-- cloth-ball` and the like select. Without any adapter
+//! nothing is measured.
 
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(clippy::unwrap_used, reason = "a bench that cannot start has nothing to measure")]
 #![allow(clippy::print_stderr, reason = "a bench that measures nothing says so")]
 
 use cloth_gpu::collision::mesh::{Vec3, generators};
-use cloth_gpu::collision::{Bvh, CollisionMesh, Detector, Mode, Query};
 use cloth_gpu::stages::{compact::Compact, scan::Scan, sort::Sort};
-use cloth_gpu::{Array, Gpu, GpuOptions, GridGpu, Length, Recorder};
+use cloth_gpu::{Array, Gpu, GpuOptions, Length, Recorder};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::time::{Duration, Instant};
 
-const SIZES: [u32; 3] = [10_000, 300_000, 4_000_000];
+#[path = "gpu/tables.rs"]
+mod tables;
+
+/// The last one on GPUs only.
+const SIZES: [u32; 4] = [10_000, 100_000, 1_000_000, 10_000_000];
 
 fn words(n: u32) -> Vec<u32> {
     (0..n).map(|i| i.wrapping_mul(2_654_435_761)).collect()
@@ -35,8 +39,11 @@ fn primitives(c: &mut Criterion) {
         Err(reason) => return eprintln!("nothing measured: {reason}"),
     };
     eprintln!("{}, subgroups: {}", gpu.description(), gpu.has_subgroups());
+    if gpu.is_software() {
+        eprintln!("a software adapter: a processor that plays a GPU; its times say nothing about a GPU");
+    }
     let array = |data: &[u32]| Array::with(&gpu, "bench", data).unwrap();
-    for n in SIZES {
+    for n in SIZES.into_iter().take(if gpu.is_software() { 3 } else { 4 }) {
         let (input, flags) = (words(n), words(n).iter().map(|w| w >> 31).collect::<Vec<_>>());
         let (keys, high, values, flags) = (array(&input), array(&input), array(&input), array(&flags));
         let output = Array::<u32>::new(&gpu, "bench", n as usize + 1).unwrap();
@@ -77,27 +84,11 @@ fn folded(n: usize) -> (Vec<[u32; 3]>, Vec<Vec3>, Vec<Vec3>) {
     (sheet.triangles, x_t0, x_t1)
 }
 
-fn methods(c: &mut Criterion) {
+fn tables(_: &mut Criterion) {
     let Ok(gpu) = Gpu::new(GpuOptions::default()) else { return };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
-    let (triangles, x_t0, x_t1) = folded(113);
-    let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
-    let detectors: [(&str, Box<dyn Detector>); 3] = [
-        ("bvh", Box::new(Bvh::new(&mesh, &x_t0).unwrap())),
-        ("grid on the device", Box::new(GridGpu::new(gpu.clone(), &mesh).unwrap())),
-        ("virtual subdivision on the device", Box::new(GridGpu::virtual_subdivision(gpu, &mesh).unwrap())),
-    ];
-    let mut group = c.benchmark_group("folded, 25088 triangles");
-    group.sample_size(10);
-    for (name, mut detector) in detectors {
-        for mode in [Mode::Continuous, Mode::Discrete] {
-            let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.004, mode, active: None };
-            group.bench_function(BenchmarkId::new(name, format!("{mode:?}")), |b| {
-                b.iter(|| detector.detect(&mesh, &query, &pool).unwrap());
-            });
-        }
-    }
+    tables::stages(&gpu);
+    tables::scenes(&gpu);
 }
 
-criterion_group!(benches, primitives, methods);
+criterion_group!(benches, primitives, tables);
 criterion_main!(benches);

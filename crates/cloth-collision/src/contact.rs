@@ -101,6 +101,15 @@ pub struct DetectStats {
     pub candidates_edge_edge: u64,
     /// Candidates that the filters did not reject (exact root search).
     pub root_searches: u64,
+    /// Further counts of the method, by name, in order.
+    pub counts: Vec<(&'static str, u64)>,
     /// Seconds per stage, in order.
     pub seconds: Vec<(&'static str, f64)>,
+}
+
+impl DetectStats {
+    /// The further count of that name; 0 if the method has none.
+    pub fn count(&self, name: &str) -> u64 {
+        self.counts.iter().find(|c| c.0 == name).map_or(0, |c| c.1)
+    }
 }

@@ -1,10 +1,11 @@
 // Vertex-triangle and edge-edge candidates of the triangle pairs. Each vertex and edge is tested by the one triangle that owns it
-// (R-triangles: Curtis et al. 2008), so a pair of features comes up once; features whose boxes stay apart are dropped.
+// (R-triangles: Curtis et al. 2008), so a pair of features comes up once; features whose boxes stay apart are dropped, and with DOPS
+// triangles and features whose 18-DOPs do.
 //   in   pairs[p]         p < min(room, status[STATUS_TRIANGLE_PAIRS])
 //        triangles[t]     corners; features[t]: edges 01, 12, 20, and the features it owns (bits 0..2 corners, 3..5 edges)
 //        positions, active_bits: as in triangle_bounds
 //   out  vertex_triangle, edge_edge: unordered; what does not fit is counted in the status and left out
-// Includes: layout, boxes.   Twin: src/twin/features.rs
+// Includes: layout, boxes, dops (DOPS).   Twin: src/twin/features.rs
 @group(0) @binding(0) var<uniform> params: SceneParams;
 @group(0) @binding(1) var<storage, read> triangles: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> features: array<vec4<u32>>;
@@ -25,6 +26,20 @@ fn is_active(vertex: u32) -> bool {
 fn corner_box(vertex: u32) -> Box {
     return vertex_box(positions[vertex], positions[params.second + vertex]);
 }
+
+//#if DOPS
+fn corner_dop(vertex: u32) -> Dop {
+    return vertex_dop(positions[vertex].xyz, positions[params.second + vertex].xyz, params.thickness);
+}
+
+fn edge_dop(a: u32, b: u32) -> Dop {
+    return dop_hull(corner_dop(a), corner_dop(b));
+}
+
+fn whole_dop(corners: vec3<u32>) -> Dop {
+    return dop_hull(edge_dop(corners.x, corners.y), corner_dop(corners.z));
+}
+//#end
 
 struct Side {
     corners: vec3<u32>,
@@ -80,6 +95,32 @@ fn edges_near(a: ptr<function, Side>, b: ptr<function, Side>) -> u32 {
     return near;
 }
 
+//#if DOPS
+// Which of the vertices and edges remain, bits as in feature_pairs. Few pairs come here: their boxes are the cheaper test.
+fn dops_near(a: vec3<u32>, b: vec3<u32>, vertices: u32, edges: u32) -> vec2<u32> {
+    let whole_a = whole_dop(a);
+    let whole_b = whole_dop(b);
+    if !dops_may_touch(whole_a, whole_b) { return vec2<u32>(); }
+    var near = vec2<u32>();
+    for (var bits = vertices; bits != 0u; bits &= bits - 1u) {
+        let k = firstTrailingBit(bits);
+        if k < 3u {
+            if dops_may_touch(corner_dop(a[k]), whole_b) { near.x |= 1u << k; }
+        } else if dops_may_touch(corner_dop(b[k - 3u]), whole_a) {
+            near.x |= 1u << k;
+        }
+    }
+    for (var bits = edges; bits != 0u; bits &= bits - 1u) {
+        let k = firstTrailingBit(bits);
+        let i = k / 3u;
+        let j = k % 3u;
+        let edge_a = edge_dop(a[i], a[(i + 1u) % 3u]);
+        if dops_may_touch(edge_a, edge_dop(b[j], b[(j + 1u) % 3u])) { near.y |= 1u << k; }
+    }
+    return near;
+}
+//#end
+
 @compute @workgroup_size(WORKGROUP)
 fn feature_pairs(
     @builtin(local_invocation_index) index: u32,
@@ -103,6 +144,13 @@ fn feature_pairs(
         b = side(pair.y);
         vertices = vertices_near(&a, &b) | (vertices_near(&b, &a) << 3u);
         edges = edges_near(&a, &b);
+//#if DOPS
+        if (vertices | edges) != 0u {
+            let near = dops_near(a.corners, b.corners, vertices, edges);
+            vertices = near.x;
+            edges = near.y;
+        }
+//#end
         if vertices != 0u { place.x = atomicAdd(&sh_counts[0], countOneBits(vertices)); }
         if edges != 0u { place.y = atomicAdd(&sh_counts[1], countOneBits(edges)); }
     }

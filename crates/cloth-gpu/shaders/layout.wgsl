@@ -21,12 +21,14 @@ struct SceneParams {
     // Index of the positions at t1: vertices in a moving query, 0 in a resting one, which has one end.
     second: u32,
     all_active: u32,
-    pad: u32,
+    // Distance that counts as contact, not less than the exact one.
+    thickness: f32,
     // Box of the scene.
     low: vec3<f32>,
-    pad_low: u32,
+    // 1: the distance that counts as contact is exactly 0.
+    is_thin: u32,
     high: vec3<f32>,
-    pad_high: u32,
+    pad: u32,
 }
 
 struct Grid {

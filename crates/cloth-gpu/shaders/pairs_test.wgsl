@@ -1,9 +1,10 @@
 // The triangle pairs of the cells: one test per invocation and turn, whatever cell it comes from (thesis 5.3.4). The workgroup
 // finds the registrations of its first and last test by binary search in the sums, keeps the sums between at hand, and
 // each invocation finds its own registration in those. Spheres come first; the few pairs that pass are shared out anew over
-// the invocations for the rest.
+// the invocations for the rest. With OWNERS the registrations come from pairs_owners.wgsl and nothing is searched.
 //   in   sums[r]        r ≤ n   tests before registration r, as (low, high)
 //        entries[r]             by cell; bounds[t]
+//        owners[k]      k ≥ 1   registration that begins test k − 1 of this portion (OWNERS)
 //   out  pairs[p]       p < status[STATUS_TRIANGLE_PAIRS]: unordered; what does not fit is counted and left out
 //        status         also: registrations and tests there are
 // Includes: layout, boxes, control or octree_token (TOKEN).   Twin: src/twin/pairs.rs
@@ -14,12 +15,17 @@
 @group(0) @binding(4) var<storage, read> bounds: array<Bounds>;
 @group(0) @binding(5) var<storage, read_write> pairs: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read_write> status: array<atomic<u32>>;
+//#if OWNERS
+@group(0) @binding(7) var<storage, read> owners: array<u32>;
+//#end
 
+//#if !OWNERS
 // Registrations of the workgroup's first and last test.
 var<workgroup> sh_ends: array<u32, 2>;
 // Tests before each registration from the first to the last, counted from the workgroup's first test.
 var<workgroup> sh_window: array<u32, SEARCH_WINDOW>;
-// Tests whose spheres touch.
+//#end
+// Tests that passed the first look.
 var<workgroup> sh_near: array<u32, PAIR_BLOCK>;
 var<workgroup> sh_near_count: atomic<u32>;
 var<workgroup> sh_count: atomic<u32>;
@@ -28,6 +34,8 @@ var<workgroup> sh_base: u32;
 // The tests of the workgroup, and the registrations that they begin with.
 struct Share {
     begin: vec2<u32>,
+    // Tests of this portion that belong to earlier workgroups.
+    offset: u32,
     size: u32,
     first: u32,
     last: u32,
@@ -55,6 +63,15 @@ fn find(test: vec2<u32>, first: u32, past: u32) -> u32 {
     return low;
 }
 
+//#if OWNERS
+// The registrations of a test: who begins it, and the partner.
+fn locate(share: Share, test: u32) -> vec2<u32> {
+    let r = owners[share.offset + test + 1u];
+    return vec2<u32>(r, r + 1u + (share.begin.x + test - sums[r].x));
+}
+//#end
+
+//#if !OWNERS
 // The registrations of a test: who begins it, and the partner.
 fn locate(share: Share, test: u32) -> vec2<u32> {
     if share.last - share.first < SEARCH_WINDOW {
@@ -70,6 +87,7 @@ fn locate(share: Share, test: u32) -> vec2<u32> {
     let r = find(plus(share.begin, test), share.first, share.last + 1u);
     return vec2<u32>(r, r + 1u + (share.begin.x + test - sums[r].x));
 }
+//#end
 
 fn bodies_meet(a: u32, b: u32) -> bool {
     if (a >> 2u) == (b >> 2u) { return (a & 1u) != 0u; }
@@ -84,11 +102,20 @@ fn spheres_touch(pair: vec2<u32>) -> bool {
 }
 
 //#if TOKEN
+// Many pairs share several leaves: those that are tested elsewhere go before the boxes are asked for.
+fn is_near(pair: vec2<u32>) -> bool {
+    return spheres_touch(pair) && holds_token(entries[pair.x], entries[pair.y]);
+}
+
 fn is_here(pair: vec2<u32>) -> bool {
-    return holds_token(entries[pair.x], entries[pair.y]);
+    return true;
 }
 //#end
 //#if !TOKEN
+fn is_near(pair: vec2<u32>) -> bool {
+    return spheres_touch(pair);
+}
+
 // Whether the pair is tested in this cell and not in the home of the second.
 fn is_here(pair: vec2<u32>) -> bool {
     return (entries[pair.y].key & 1u) == 0u
@@ -129,15 +156,18 @@ fn pairs_test(
     } else if is_at_most(total, plus(begin, size)) {
         size = total.x - begin.x;
     }
+//#if !OWNERS
     if index < 2u && size > 0u {
         sh_ends[index] = find(plus(begin, index * (size - 1u)), 0u, n);
     }
+//#end
     if index == 0u {
         atomicStore(&sh_near_count, 0u);
         atomicStore(&sh_count, 0u);
     }
     workgroupBarrier();
-    var share = Share(begin, size, 0u, 0u, 0u);
+    var share = Share(begin, offset, size, 0u, 0u, 0u);
+//#if !OWNERS
     if size > 0u {
         share.first = sh_ends[0];
         share.last = sh_ends[1];
@@ -150,12 +180,13 @@ fn pairs_test(
         }
     }
     workgroupBarrier();
+//#end
 
     // Bit per turn.
     var near = 0u;
     for (var turn = 0u; turn < PAIR_ITEMS; turn++) {
         let test = turn * WORKGROUP + index;
-        if test < size && spheres_touch(locate(share, test)) { near |= 1u << turn; }
+        if test < size && is_near(locate(share, test)) { near |= 1u << turn; }
     }
     var slot = atomicAdd(&sh_near_count, countOneBits(near));
     for (; near != 0u; near &= near - 1u) {

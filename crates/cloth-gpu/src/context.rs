@@ -194,6 +194,11 @@ impl Gpu {
         }
     }
 
+    /// Kernels compiled so far: each once, whatever asks for it.
+    pub fn compiled(&self) -> usize {
+        lock(&self.kernels).len()
+    }
+
     /// The kernel of that key, compiled at the first call.
     pub(crate) fn kernel(
         &self,

@@ -23,6 +23,8 @@ pub struct Frame {
     pub half: [f32; 3],
     /// Index of the first position at t1: 0 if there is one end only.
     pub second: u32,
+    /// Thickness in units of the scene, not less than the exact one; what joins everything if that is more.
+    pub thickness: f32,
     /// (x, y, z, r) per vertex at t0 (moving queries), then at t1: along each axis the vertex lies within r − half the
     /// thickness of it.
     pub positions: Vec<[f32; 4]>,
@@ -60,6 +62,7 @@ impl Frame {
             origin,
             half: [0, 1, 2].map(|k| ((half[k] * scale) as f32).next_up()),
             second: if is_moving { query.x_t0.len() as u32 } else { 0 },
+            thickness: ((2.0 * margin) as f32).next_up(),
             positions,
         }
     }

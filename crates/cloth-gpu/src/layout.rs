@@ -26,16 +26,16 @@ pub struct SceneParams {
     pub second: u32,
     /// 1: every vertex is active.
     pub all_active: u32,
-    /// Unused.
-    pub pad: u32,
+    /// Distance that counts as contact, not less than the exact one.
+    pub thickness: f32,
     /// Lower corner of the scene's box.
     pub low: [f32; 3],
-    /// Unused.
-    pub pad_low: u32,
+    /// 1: the distance that counts as contact is exactly 0.
+    pub is_thin: u32,
     /// Upper corner.
     pub high: [f32; 3],
     /// Unused.
-    pub pad_high: u32,
+    pub pad: u32,
 }
 
 /// The cells.

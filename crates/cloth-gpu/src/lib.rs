@@ -11,6 +11,7 @@
 
 pub use cloth_collision as collision;
 
+pub mod chunks;
 pub mod kernel;
 pub mod layout;
 pub mod limits;
@@ -24,13 +25,18 @@ mod error;
 mod frame;
 mod grid;
 mod octree;
+mod portions;
 mod recorder;
+mod seconds;
+mod tail;
 
 pub use adapters::{Adapter, AdapterChoice, adapters};
 pub use buffers::{Array, Length};
 pub use context::{Gpu, GpuOptions};
 pub use error::GpuError;
 pub use frame::Frame;
-pub use grid::{GridGpu, GridOptions};
-pub use octree::{Levels, OctreeCounts, OctreeGpu, OctreeOptions, Thresholds};
+pub use grid::{Distribution, Duplicates, GridGpu, GridOptions};
+pub use octree::{Levels, OctreeGpu, OctreeOptions, Thresholds};
 pub use recorder::{Answer, Recorder};
+pub use seconds::Seconds;
+pub use tail::{Tail, TailCounts};

@@ -39,8 +39,10 @@ pub mod status {
     pub const EDGE_EDGE: u32 = 7;
     /// 1: some triangle would come to more than [`super::MAX_PART_BITS`] allows.
     pub const TOO_FINE: u32 = 8;
+    /// Vertex-triangle candidates that the filter leaves, in this part of the tests; the edge-edge ones follow.
+    pub const LEFT: u32 = 9;
     /// Words.
-    pub const LENGTH: u32 = 9;
+    pub const LENGTH: u32 = 11;
 }
 
 /// A sphere is registered in the cells that it touches once its radius is multiplied by this: a little more than √2. Of two
@@ -55,6 +57,16 @@ pub const CELL_RADII: f32 = 3.0;
 pub const MIN_CELL: f32 = 1.0 / (1 << 11) as f32;
 /// Most cells: their numbers and one bit more fit into a key.
 pub const MAX_CELLS: f32 = (1u32 << 30) as f32;
+
+/// Bound of what one operation in single precision is off by, relative to its result: WGSL gives either neighbour of the exact
+/// result.
+pub const ROUNDING: f32 = 1.0 / (1 << 23) as f32;
+/// What a position on the device may be off by along each axis, with room. In units in which the scene lies within [−1, 1],
+/// rounding costs at most 2⁻²⁵; the rest, more than 2⁻²⁴, is kept as a distance by which everything that is rejected stays
+/// apart (see `shaders/narrow_filter.wgsl`).
+pub const POSITION_ERROR: f32 = 1.0 / (1 << 23) as f32;
+/// Directions that the filter of the narrow phase tries.
+pub const FILTER_STEPS: u32 = 8;
 
 /// Logarithm of the parts that one triangle may come to: 4^l · 2^m with 2 l + m at most this.
 pub const MAX_PART_BITS: u32 = 18;
@@ -79,6 +91,8 @@ pub fn shader_prelude() -> String {
         ("MIN_CELL", MIN_CELL),
         ("MAX_CELLS", MAX_CELLS),
         ("PART_SLACK", PART_SLACK),
+        ("ROUNDING", ROUNDING),
+        ("POSITION_ERROR", POSITION_ERROR),
     ]
     .map(|(name, value)| format!("const {name} = {value:?}f;\n"));
     let words = [
@@ -94,6 +108,7 @@ pub fn shader_prelude() -> String {
         ("SEARCH_WINDOW", SEARCH_WINDOW),
         ("MAX_PART_BITS", MAX_PART_BITS),
         ("PAGE_WORKGROUP", PAGE_WORKGROUP),
+        ("FILTER_STEPS", FILTER_STEPS),
         ("TALLY_LENGTH", TALLY_LENGTH),
         ("TALLY_LEAVES", TALLY_LENGTH - 1),
         ("STATUS_TOO_FINE", status::TOO_FINE),
@@ -104,6 +119,7 @@ pub fn shader_prelude() -> String {
         ("STATUS_TRIANGLE_PAIRS", status::TRIANGLE_PAIRS),
         ("STATUS_VERTEX_TRIANGLE", status::VERTEX_TRIANGLE),
         ("STATUS_EDGE_EDGE", status::EDGE_EDGE),
+        ("STATUS_LEFT", status::LEFT),
     ]
     .map(|(name, value)| format!("const {name} = {value}u;\n"));
     words.concat() + &floats.concat()

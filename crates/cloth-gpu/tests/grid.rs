@@ -3,15 +3,13 @@
 
 mod support;
 
-use cloth_gpu::collision::{BruteForce, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
+use cloth_gpu::collision::{
+    BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3,
+};
 use cloth_gpu::twin::grid::GridTwin;
 use cloth_gpu::{Frame, Gpu, GpuError, GpuOptions, GridGpu, GridOptions};
 use std::sync::Arc;
-use support::{Random, bodies, device, difference, pool, sheet, soup, variants};
-
-fn moved(x: &[Vec3], by: f64, random: &mut Random) -> Vec<Vec3> {
-    x.iter().map(|x| x + random.vector(by)).collect()
-}
+use support::{Random, bodies, device, difference, moved, pool, sheet, soup, variants};
 
 /// Asks twice (the second time with the room of the first), and compares with brute force; returns the contacts' number.
 fn compare(grid: &mut GridGpu, mesh: &CollisionMesh, query: &Query<'_>, what: &str) -> usize {
@@ -205,6 +203,37 @@ fn bad_scenes_agree() {
     assert!(compare_all(&device.gpu, &mesh, &x_t0, &x_t1, &mut random, "large motion") > 100);
 }
 
+/// One triangle as large as the scene among 100,000 small ones, of which it cuts some.
+#[test]
+fn one_huge_triangle_among_many_small_ones_agrees() {
+    let Some(device) = device(GpuOptions::default()) else { return };
+    let mut random = Random(21);
+    let (mut x_t0, mut triangles) = soup(100_000, 0.002, &mut random);
+    for (t, corners) in triangles.iter_mut().enumerate() {
+        corners[0] = 3 * t as u32;
+    }
+    let n = x_t0.len() as u32;
+    x_t0.extend([Vec3::new(-0.5, 0.4, -0.5), Vec3::new(0.5, -0.4, -0.5), Vec3::new(0.0, 0.0, 0.5)]);
+    triangles.push([n, n + 1, n + 2]);
+    let x_t1 = moved(&x_t0, 0.002, &mut random);
+    let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+    let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
+    let expected = Bvh::new(&mesh, &x_t0).unwrap().detect(&mesh, &query, &pool(2)).unwrap();
+    let huge = triangles.len() as u32 - 1;
+    assert!(expected.vertex_triangle.iter().filter(|p| p[1] == huge).count() > 50);
+    let mut grid = GridGpu::virtual_subdivision(device.gpu.clone(), &mesh).unwrap();
+    let got = grid.detect(&mesh, &query, &pool(2)).unwrap();
+    assert_eq!(difference(&expected, &got), None);
+    assert!(got.stats.broad_phase_tests < 50_000_000, "{}", got.stats.broad_phase_tests);
+    // The traditional grid has all of them in one cell: five thousand million tests, so fewer triangles.
+    let few = CollisionMesh::single(x_t0.len(), &triangles[triangles.len() - 4000..]).unwrap();
+    let expected = Bvh::new(&few, &x_t0).unwrap().detect(&few, &query, &pool(2)).unwrap();
+    let mut grid = GridGpu::new(device.gpu.clone(), &few).unwrap();
+    let got = grid.detect(&few, &query, &pool(2)).unwrap();
+    assert_eq!(difference(&expected, &got), None);
+    assert!(got.stats.broad_phase_tests > 7_000_000);
+}
+
 #[test]
 fn small_room_and_small_portions_change_nothing() {
     for options in [
@@ -225,40 +254,16 @@ fn small_room_and_small_portions_change_nothing() {
             (Some(50), Some(1000), Some(5000)),
         ] {
             for subdivision in [None, Some(1.2)] {
-                let options =
-                    GridOptions { subdivision, first_capacity: first, max_capacity: most, max_tests: tests };
+                let options = GridOptions {
+                    subdivision,
+                    first_capacity: first,
+                    max_capacity: most,
+                    max_tests: tests,
+                    ..GridOptions::default()
+                };
                 let mut grid = GridGpu::with_options(device.gpu.clone(), &mesh, options).unwrap();
                 assert!(compare(&mut grid, &mesh, &query, &format!("{options:?}")) > 1000);
             }
-        }
-    }
-}
-
-#[test]
-fn too_small_a_device_says_so() {
-    let mut random = Random(8);
-    let (x, triangles) = soup(400, 0.3, &mut random);
-    let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
-    let options = GpuOptions { max_binding_bytes: Some(40_000), ..GpuOptions::default() };
-    let Some(device) = device(options) else { return };
-    let mut grid = GridGpu::with_options(
-        device.gpu.clone(),
-        &mesh,
-        GridOptions { first_capacity: Some(8), ..GridOptions::default() },
-    );
-    // The topology fits, the registrations may not: either way the error names what and how much.
-    if let Ok(grid) = &mut grid {
-        let query = Query { x_t0: &x, x_t1: &x, thickness: 0.0, mode: Mode::Continuous, active: None };
-        let refused = grid.detect(&mesh, &query, &pool(1));
-        match refused {
-            Ok(contacts) => {
-                let expected = BruteForce.detect(&mesh, &query, &pool(1)).unwrap();
-                assert_eq!(difference(&expected, &contacts), None);
-            }
-            Err(DetectError::Device { detector: "grid", reason }) => {
-                assert!(reason.contains("bytes"), "{reason}");
-            }
-            Err(other) => panic!("{other}"),
         }
     }
 }
@@ -268,21 +273,33 @@ fn bad_input_is_named() {
     let Some(device) = device(GpuOptions::default()) else { return };
     let x = vec![Vec3::zeros(), Vec3::x(), Vec3::y()];
     let mesh = CollisionMesh::single(3, &[[0, 1, 2]]).unwrap();
-    let mut grid = GridGpu::new(device.gpu.clone(), &mesh).unwrap();
-    assert_eq!(grid.name(), "grid");
     let good = Query { x_t0: &x, x_t1: &x, thickness: 0.0, mode: Mode::Continuous, active: None };
-    let mut ask = |query: &Query<'_>| grid.detect(&mesh, query, &pool(1)).map(|_| ());
-    assert_eq!(ask(&good), Ok(()));
-    assert!(matches!(
-        ask(&Query { thickness: f64::NAN, ..good }),
-        Err(DetectError::Parameter { parameter: "thickness", .. })
-    ));
+    let empty = CollisionMesh::single(3, &[]).unwrap();
     let mut bad = x.clone();
     bad[2].z = f64::NAN;
-    assert!(matches!(
-        ask(&Query { x_t1: &bad, ..good }),
-        Err(DetectError::NotFinite { array: "x_t1", vertex: 2, .. })
-    ));
+    for (method, name) in [
+        (GridGpu::new as fn(_, &CollisionMesh) -> Result<GridGpu, GpuError>, "grid"),
+        (GridGpu::virtual_subdivision, "virtual-subdivision"),
+    ] {
+        let mut grid = method(device.gpu.clone(), &mesh).unwrap();
+        assert_eq!(grid.name(), name);
+        let mut ask = |query: &Query<'_>| grid.detect(&mesh, query, &pool(1)).map(|_| ());
+        assert_eq!(ask(&good), Ok(()));
+        assert!(matches!(
+            ask(&Query { thickness: f64::NAN, ..good }),
+            Err(DetectError::Parameter { parameter: "thickness", .. })
+        ));
+        assert!(matches!(
+            ask(&Query { x_t1: &bad, ..good }),
+            Err(DetectError::NotFinite { array: "x_t1", vertex: 2, .. })
+        ));
+        assert!(matches!(
+            grid.detect(&empty, &good, &pool(1)),
+            Err(DetectError::OtherMesh { expected: 1, got: 0 })
+        ));
+        let none = method(device.gpu.clone(), &empty).unwrap().detect(&empty, &good, &pool(1)).unwrap();
+        assert_eq!(none, Contacts::default());
+    }
     for lambda in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let options = GridOptions { subdivision: Some(lambda), ..GridOptions::default() };
         let refused = GridGpu::with_options(device.gpu.clone(), &mesh, options).map(|_| ());
@@ -291,13 +308,6 @@ fn bad_input_is_named() {
             Err(GpuError::Query(DetectError::Parameter { parameter: "subdivision", .. }))
         ));
     }
-    let empty = CollisionMesh::single(3, &[]).unwrap();
-    assert!(matches!(
-        grid.detect(&empty, &good, &pool(1)),
-        Err(DetectError::OtherMesh { expected: 1, got: 0 })
-    ));
-    let none = GridGpu::new(device.gpu.clone(), &empty).unwrap().detect(&empty, &good, &pool(1)).unwrap();
-    assert_eq!(none, Contacts::default());
 }
 
 #[test]

@@ -5,7 +5,9 @@ use cloth_gpu::kernel::Source;
 use cloth_gpu::layout::{
     Bounds, Entry, Grid, LengthParams, OctreeParams, PairParams, SceneParams, SubdivisionParams,
 };
-use cloth_gpu::stages::{bounds, cells, compact, features, octree, pairs, scan, sort, subdivision};
+use cloth_gpu::stages::{
+    bounds, cells, compact, features, narrow_filter, octree, pairs, scan, sort, subdivision,
+};
 use std::mem::offset_of;
 
 /// Name, offset and size of each member, and the struct's size.
@@ -34,7 +36,7 @@ macro_rules! layout {
 fn layouts_are_equal() {
     for (name, host) in [
         layout!(LengthParams { most, word, shift, extra }),
-        layout!(SceneParams { triangles, second, all_active, pad, low, pad_low, high, pad_high }),
+        layout!(SceneParams { triangles, second, all_active, thickness, low, is_thin, high, pad }),
         layout!(Grid { low, size, cells, inverse }),
         layout!(PairParams { most, word, start_low, start_high, count, pad_0, pad_1, pad_2 }),
         layout!(Bounds { low_0, is_active, high_0, body, low_1, pad_low, high_1, pad_high }),
@@ -66,7 +68,9 @@ fn swapped_members_are_noticed() {
 }
 
 fn all_sources() -> Vec<Source> {
-    let mut all = vec![compact::source(), bounds::source(), features::source()];
+    let mut all = vec![compact::source(), bounds::source()];
+    all.extend([false, true].map(features::source));
+    all.extend(narrow_filter::sources());
     all.extend(cells::sources());
     all.extend(pairs::sources());
     all.extend(subdivision::sources());

@@ -58,12 +58,12 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, levels: Levels, is_tw
     let mut scene = Scene::new(gpu, mesh).unwrap();
     scene.upload(gpu, query, &frame);
     let mut octree = Octree::new(gpu, n as u32, ROOM, is_two_stage).unwrap();
-    let mut pairs = Pairs::new(gpu, ROOM).unwrap();
+    let mut pairs = Pairs::new(gpu, ROOM, false).unwrap();
     let mut recorder = Recorder::new(gpu);
     scene.record(&mut recorder);
     octree.record(&mut recorder, &scene, frame.reach(), levels).unwrap();
     pairs.record_counts(&mut recorder, octree.entries()).unwrap();
-    pairs.record_tests(&mut recorder, &scene, octree.entries(), 0, TESTS);
+    pairs.record_tests(&mut recorder, &scene, octree.entries(), 0, TESTS).unwrap();
     let r = &mut recorder;
     let copies = [
         whole(r, &scene.bounds),

@@ -12,7 +12,7 @@ use cloth_gpu::stages::subdivision::{self, Subdivision};
 use cloth_gpu::stages::{cells::Cells, features::Features, pairs::Pairs};
 use cloth_gpu::twin::{self, pairs::SPHERE_FACTOR};
 use cloth_gpu::{Array, Frame, Gpu, Recorder};
-use support::{Random, bodies, device, pool, soup, variants};
+use support::{Random, bodies, device, moved, pool, soup, variants};
 
 /// Radii and distances may differ by the rounding of a few operations and of a square root.
 const ROUNDING: f32 = 1e-6;
@@ -62,14 +62,14 @@ fn run(gpu: &Gpu, mesh: &CollisionMesh, query: &Query<'_>, room: u32) -> Run {
     let mut scene = Scene::new(gpu, mesh).unwrap();
     scene.upload(gpu, query, &frame);
     let mut cells = Cells::new(gpu, n as u32, 8 * n).unwrap();
-    let mut pairs = Pairs::new(gpu, room).unwrap();
-    let features = Features::new(gpu, room).unwrap();
+    let mut pairs = Pairs::new(gpu, room, false).unwrap();
+    let features = Features::new(gpu, room, true).unwrap();
     let mut recorder = Recorder::new(gpu);
     scene.record(&mut recorder);
     cells.record_setup(&mut recorder, &scene);
     cells.record(&mut recorder, scene.registered(), &scene.spheres, 32).unwrap();
     pairs.record_counts(&mut recorder, &cells).unwrap();
-    pairs.record_tests(&mut recorder, &scene, &cells, 0, tests);
+    pairs.record_tests(&mut recorder, &scene, &cells, 0, tests).unwrap();
     features.record(&mut recorder, &scene, &pairs.found, room as u32);
     let r = &mut recorder;
     let copies = [
@@ -191,15 +191,12 @@ fn difference(r: &Run) -> Option<&'static str> {
         &r.positions,
         &r.active,
         &r.pairs,
+        Some(twin::dops::SLACK),
     );
     if sorted(vertex_triangle) != sorted(r.vertex_triangle.clone()) {
         return Some("vertex-triangle candidates");
     }
     (sorted(edge_edge) != sorted(r.edge_edge.clone())).then_some("edge-edge candidates")
-}
-
-fn moved(x: &[Vec3], by: f64, random: &mut Random) -> Vec<Vec3> {
-    x.iter().map(|x| x + random.vector(by)).collect()
 }
 
 /// A soup of n loose triangles, moving.

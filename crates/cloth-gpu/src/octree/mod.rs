@@ -2,9 +2,11 @@
 
 mod core;
 
+use crate::chunks;
 use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, Query};
 use crate::context::Gpu;
 use crate::error::GpuError;
+use crate::layout::Entry;
 use crate::limits::MAX_LEVELS;
 pub use crate::stages::octree::{Levels, Thresholds};
 use core::Core;
@@ -24,10 +26,12 @@ pub struct OctreeOptions {
     pub first_capacity: Option<u32>,
     /// Most triangle pairs and most candidates of a kind at a time. None: 2^23, or what one binding holds.
     pub max_capacity: Option<u32>,
-    /// Most visits and most registrations: then the tree loses a level. None: 2^24, or what one binding holds.
+    /// Most visits to pages and most registrations: then the tree loses a level. None: 2^24, or what one binding holds.
     pub max_registrations: Option<u32>,
     /// Most tests per submission, at least 1. None: 2^24 on a software adapter, else 2^28.
     pub max_tests: Option<u32>,
+    /// Most triangles at a time; what is larger goes in chunks. None: as many as the bindings hold with four registrations each.
+    pub max_triangles: Option<u32>,
 }
 
 impl Default for OctreeOptions {
@@ -40,27 +44,36 @@ impl Default for OctreeOptions {
             max_capacity: None,
             max_registrations: None,
             max_tests: None,
+            max_triangles: None,
         }
     }
 }
 
+/// Registrations per triangle that a chunk has room for.
+const PER_TRIANGLE: usize = 4;
+
 /// Detects contacts with an octree on the device; [`Detector::name`] is `"octree"` or `"octree-single"`.
 ///
 /// The device finds candidates; [`crate::collision::NarrowPhase`] decides them. What overflows is grown and done again; what is too
-/// much for one portion is taken in several.
+/// much for one portion is taken in several; a scene that is too large for the device's bindings is taken in chunks
+/// ([`chunks`]), whose levels do not adapt.
 #[derive(Debug)]
 pub struct OctreeGpu {
-    is_two_stage: bool,
+    gpu: Arc<Gpu>,
+    options: OctreeOptions,
     vertex_count: usize,
     triangle_count: usize,
-    core: Core,
+    max_triangles: usize,
+    /// None: in chunks.
+    whole: Option<Core>,
+    counted: Vec<(&'static str, u64)>,
 }
 
 impl OctreeGpu {
     /// Two-stage, with the levels and thresholds of the thesis.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`], [`GpuError::OutOfMemory`], [`GpuError::Shader`].
+    /// [`GpuError::Shader`], [`GpuError::Lost`].
     pub fn new(gpu: Arc<Gpu>, mesh: &CollisionMesh) -> Result<Self, GpuError> {
         Self::with_options(gpu, mesh, OctreeOptions::default())
     }
@@ -89,46 +102,73 @@ impl OctreeGpu {
                 got: levels.into(),
             }));
         }
+        let bound = gpu.max_binding as usize / (PER_TRIANGLE * size_of::<Entry>());
+        let max_triangles = options.max_triangles.map_or(bound, |m| m as usize).max(1);
+        let whole = if mesh.triangles.len() > max_triangles {
+            None
+        } else {
+            match Core::new(gpu.clone(), mesh, &options) {
+                Err(error) if chunks::would_help(&error) => None,
+                core => Some(core?),
+            }
+        };
         Ok(Self {
-            is_two_stage: options.two_stage,
+            options,
             vertex_count: mesh.vertex_count,
             triangle_count: mesh.triangles.len(),
-            core: Core::new(gpu, mesh, &options)?,
+            max_triangles,
+            whole,
+            counted: vec![],
+            gpu,
         })
     }
 
-    /// Levels of the next call's tree.
-    pub fn levels(&self) -> Levels {
-        self.core.levels()
+    /// Levels of the next call's tree; None where the scene goes in chunks.
+    pub fn levels(&self) -> Option<Levels> {
+        self.whole.as_ref().map(Core::levels)
     }
 
-    /// What the last call counted.
-    pub fn counted(&self) -> OctreeCounts {
-        self.core.counted()
+    /// Registrations per level in the last call; none where the scene goes in chunks.
+    pub fn per_level(&self) -> &[u32] {
+        self.whole.as_ref().map_or(&[], Core::per_level)
     }
 
-    /// Memory on the device, scratch memory of sorts and scans not counted [B].
+    /// What the last call counted, by name: registrations, leaves that hold triangles, coarsest and finest level of the tree; in chunks,
+    /// the registrations and leaves of all.
+    pub fn counted(&self) -> &[(&'static str, u64)] {
+        &self.counted
+    }
+
+    /// Memory on the device, scratch memory of sorts and scans not counted [B]; 0 where the scene goes in chunks, which keep none.
     pub fn bytes(&self) -> u64 {
-        self.core.bytes()
+        self.whole.as_ref().map_or(0, Core::bytes)
     }
-}
 
-/// What a call counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct OctreeCounts {
-    /// Coarsest and finest level of the tree.
-    pub levels: [u32; 2],
-    /// Triangles in leaves.
-    pub registrations: u64,
-    /// Leaves that hold a triangle.
-    pub leaves: u64,
-    /// Triangles in leaves of each level.
-    pub per_level: [u32; MAX_LEVELS as usize + 1],
+    fn run(
+        &mut self,
+        mesh: &CollisionMesh,
+        query: &Query<'_>,
+        pool: &rayon::ThreadPool,
+    ) -> Result<Contacts, GpuError> {
+        if let Some(whole) = &mut self.whole {
+            match whole.run(mesh, query, pool) {
+                Err(error) if chunks::would_help(&error) => self.whole = None,
+                answer => return answer,
+            }
+        }
+        let (gpu, options) = (&self.gpu, &self.options);
+        let mut out = chunks::detect(mesh, query, self.max_triangles, |mesh, query| {
+            Core::new(gpu.clone(), mesh, options)?.run(mesh, query, pool)
+        })?;
+        // Every chunk has its own levels.
+        out.stats.counts.retain(|c| !["coarsest_level", "finest_level"].contains(&c.0));
+        Ok(out)
+    }
 }
 
 impl Detector for OctreeGpu {
     fn name(&self) -> &'static str {
-        if self.is_two_stage { "octree" } else { "octree-single" }
+        if self.options.two_stage { "octree" } else { "octree-single" }
     }
 
     fn detect(
@@ -145,9 +185,12 @@ impl Detector for OctreeGpu {
             return Ok(Contacts::default());
         }
         let detector = self.name();
-        self.core.run(mesh, query, pool).map_err(|error| match error {
+        let contacts = self.run(mesh, query, pool).map_err(|error| match error {
             GpuError::Query(error) => error,
             error => DetectError::Device { detector, reason: error.to_string() },
-        })
+        })?;
+        let known = ["registrations", "leaves", "coarsest_level", "finest_level"];
+        self.counted = contacts.stats.counts.iter().copied().filter(|c| known.contains(&c.0)).collect();
+        Ok(contacts)
     }
 }

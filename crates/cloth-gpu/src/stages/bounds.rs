@@ -21,6 +21,8 @@ pub struct Scene {
     pub triangles: Array<[u32; 4]>,
     /// See [`feature_words`].
     pub features: Array<[u32; 4]>,
+    /// Ends of each edge.
+    pub edges: Array<[u32; 2]>,
     /// See [`Frame::positions`].
     pub positions: Array<[f32; 4]>,
     /// See [`active_words`].
@@ -80,6 +82,7 @@ impl Scene {
             params: SceneParams { triangles: triangles as u32, ..Default::default() },
             triangles: Array::with(gpu, "triangles", &triangle_words(mesh))?,
             features: Array::with(gpu, "features", &feature_words(mesh))?,
+            edges: Array::with(gpu, "edges", &mesh.edges)?,
             positions: Array::new(gpu, "positions", 2 * mesh.vertex_count)?,
             active: Array::new(gpu, "active vertices", mesh.vertex_count.div_ceil(32))?,
             bounds: Array::new(gpu, "triangle boxes", triangles)?,
@@ -97,6 +100,8 @@ impl Scene {
         }
         self.params.second = frame.second;
         self.params.all_active = query.active.is_none().into();
+        self.params.thickness = frame.thickness;
+        self.params.is_thin = (query.thickness == 0.0).into();
         self.params.low = frame.half.map(|h| -h);
         self.params.high = frame.half;
     }
@@ -125,6 +130,7 @@ impl Scene {
     pub fn bytes(&self) -> u64 {
         self.triangles.bytes()
             + self.features.bytes()
+            + self.edges.bytes()
             + self.positions.bytes()
             + self.active.bytes()
             + self.bounds.bytes()

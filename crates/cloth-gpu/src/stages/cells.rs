@@ -34,6 +34,7 @@ pub struct Cells {
     setup: Arc<Kernel>,
     count: Arc<Kernel>,
     register: Arc<Kernel>,
+    roots: Arc<Kernel>,
     mark: Arc<Kernel>,
     gather: [Arc<Kernel>; 2],
     scan: Scan<u32>,
@@ -41,6 +42,8 @@ pub struct Cells {
     /// What can be registered.
     room: u32,
     is_virtual: bool,
+    /// Sort the registrations of parts by triangle too, not by cell alone: the parts of a triangle follow each other, whatever their order.
+    pub sorts_roots: bool,
     /// The cells: one element.
     pub grid: Array<Grid>,
     /// Home cell of each triangle.
@@ -55,6 +58,8 @@ pub struct Cells {
     pub keys: Array<u32>,
     /// Triangles of the registrations.
     pub registered: Array<u32>,
+    /// Triangles that the registered parts belong to, where they are sorted by.
+    pub registered_roots: Array<u32>,
     /// Which registrations of parts are kept.
     pub marks: Array<u32>,
     /// Kept registrations before each one; the last element is their number.
@@ -74,14 +79,15 @@ pub struct Registered<'a> {
     pub roots: Option<&'a Array<u32>>,
 }
 
-/// The texts of the kernels: setup, count, register, mark, gather of triangles, gather of parts.
-pub fn sources() -> [Source; 6] {
+/// The texts of the kernels: setup, count, register, roots, mark, gather of triangles, gather of parts.
+pub fn sources() -> [Source; 7] {
     let gather = || Source::new("cells_gather", include_str!("../../shaders/cells_gather.wgsl"));
     [
         Source::new("grid_setup", include_str!("../../shaders/grid_setup.wgsl")),
         Source::new("cells_count", include_str!("../../shaders/cells_count.wgsl")),
         Source::new("cells_register", include_str!("../../shaders/cells_register.wgsl"))
             .include(include_str!("../../shaders/control.wgsl")),
+        Source::new("cells_roots", include_str!("../../shaders/cells_roots.wgsl")),
         Source::new("cells_mark", include_str!("../../shaders/cells_mark.wgsl")),
         gather(),
         gather().switch("VIRTUAL", true),
@@ -94,18 +100,20 @@ impl Cells {
     /// # Errors
     /// [`GpuError::Shader`], [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
     pub fn new(gpu: &Gpu, room: u32, capacity: usize) -> Result<Self, GpuError> {
-        let [setup, count, register, mark, gather, gather_parts] = sources();
+        let [setup, count, register, roots, mark, gather, gather_parts] = sources();
         let n = room as usize;
         Ok(Self {
             setup: setup.kernel(gpu)?,
             count: count.kernel(gpu)?,
             register: register.kernel(gpu)?,
+            roots: roots.kernel(gpu)?,
             mark: mark.kernel(gpu)?,
             gather: [gather.kernel(gpu)?, gather_parts.kernel(gpu)?],
             scan: Scan::new(gpu)?,
             sort: Sort::new(gpu)?,
             room,
             is_virtual: false,
+            sorts_roots: false,
             grid: Array::new(gpu, "grid", 1)?,
             homes: Array::new(gpu, "home cells", n)?,
             controls: Array::new(gpu, "control bits", n)?,
@@ -113,6 +121,7 @@ impl Cells {
             offsets: Array::new(gpu, "first registrations", n + 1)?,
             keys: Array::new(gpu, "cell keys", capacity)?,
             registered: Array::new(gpu, "registered triangles", capacity)?,
+            registered_roots: Array::new(gpu, "registered roots", 1)?,
             marks: Array::new(gpu, "marks", 1)?,
             kept: Array::new(gpu, "kept registrations", 1)?,
             entries: Array::new(gpu, "registrations by cell", capacity)?,
@@ -197,7 +206,17 @@ impl Cells {
         recorder.stage("sort");
         let most = self.keys.capacity() as u32;
         let length = Length::device(most, &self.offsets, self.room);
-        self.sort.record(recorder, &self.keys, &self.registered, length, key_bits)?;
+        match what.roots.filter(|_| self.sorts_roots) {
+            Some(roots) => {
+                self.registered_roots.grow(gpu, most as usize)?;
+                let params = LengthParams { most, word: self.room, ..Default::default() };
+                let low = &self.registered_roots;
+                let arrays = [&self.offsets.raw, &self.registered.raw, &roots.raw, &low.raw];
+                recorder.dispatch(&self.roots, &params, &arrays, most.div_ceil(WORKGROUP));
+                self.sort.record_wide(recorder, low, &self.keys, &self.registered, length, 32 + key_bits)?;
+            }
+            None => self.sort.record(recorder, &self.keys, &self.registered, length, key_bits)?,
+        }
 
         recorder.stage("gather");
         let params = LengthParams { most, word: self.room, ..Default::default() };
@@ -234,6 +253,7 @@ impl Cells {
             &self.offsets,
             &self.keys,
             &self.registered,
+            &self.registered_roots,
             &self.marks,
             &self.kept,
         ];

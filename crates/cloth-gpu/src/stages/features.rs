@@ -19,20 +19,22 @@ pub struct Features {
     pub edge_edge: Array<[u32; 2]>,
 }
 
-/// The kernel's text.
-pub fn source() -> Source {
+/// The kernel's text, without and with 18-DOPs.
+pub fn source(dops: bool) -> Source {
     Source::new("feature_pairs", include_str!("../../shaders/feature_pairs.wgsl"))
         .include(include_str!("../../shaders/boxes.wgsl"))
+        .include(include_str!("../../shaders/dops.wgsl"))
+        .switch("DOPS", dops)
 }
 
 impl Features {
-    /// Builds the pipeline; room for `capacity` candidates of each kind.
+    /// Builds the pipeline; room for `capacity` candidates of each kind. `dops`: 18-DOPs are compared too.
     ///
     /// # Errors
     /// [`GpuError::Shader`], [`GpuError::TooLarge`], [`GpuError::OutOfMemory`].
-    pub fn new(gpu: &Gpu, capacity: usize) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, capacity: usize, dops: bool) -> Result<Self, GpuError> {
         Ok(Self {
-            kernel: source().kernel(gpu)?,
+            kernel: source(dops).kernel(gpu)?,
             vertex_triangle: Array::new(gpu, "vertex-triangle candidates", capacity)?,
             edge_edge: Array::new(gpu, "edge-edge candidates", capacity)?,
         })

@@ -4,6 +4,7 @@ pub mod bounds;
 pub mod cells;
 pub mod compact;
 pub mod features;
+pub mod narrow_filter;
 pub mod octree;
 pub mod pairs;
 pub mod scan;

@@ -50,7 +50,7 @@ impl GridTwin {
         let tests = counts.iter().map(|&c| u64::from(c)).sum();
         let found = pairs::pairs_test(&counts, &entries, &boxes, 0, tests, pairs::SPHERE_FACTOR);
         let (vertex_triangle, edge_edge) =
-            features::feature_pairs(&params, &triangles, &owned, &frame.positions, &active, &found);
+            features::feature_pairs(&params, &triangles, &owned, &frame.positions, &active, &found, None);
         (vertex_triangle, edge_edge, tests)
     }
 }

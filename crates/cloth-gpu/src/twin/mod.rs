@@ -4,8 +4,10 @@
 pub mod bounds;
 pub mod cells;
 pub mod compact;
+pub mod dops;
 pub mod features;
 pub mod grid;
+pub mod narrow_filter;
 pub mod octree;
 pub mod pairs;
 pub mod scan;

@@ -58,6 +58,30 @@ pub fn pairs_test(
     out
 }
 
+/// The registration that begins each of the `count` tests from `start` on, for as many as there are.
+pub fn pairs_owners(counts: &[u32], start: u64, count: u32) -> Vec<u32> {
+    let (mut marks, mut before) = (vec![0u32; count as usize], 0u64);
+    for (r, &tests) in counts.iter().enumerate() {
+        let after = before + u64::from(tests);
+        if before <= start && after > start {
+            marks[0] += r as u32;
+        } else if before > start && before - start < count.into() {
+            marks[(before - start) as usize] += 1;
+        }
+        before = after;
+    }
+    let there = before.saturating_sub(start).min(count.into()) as usize;
+    let mut sum = 0;
+    marks.truncate(there);
+    marks
+        .iter()
+        .map(|m| {
+            sum += m;
+            sum
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,6 +92,19 @@ mod tests {
         // Per cell: pairs with one at home. Cell 0: 2 at home, 2 guests; 1: guests only; 3: 3 at home.
         assert_eq!(pairs_count(&keys), [3, 2, 0, 0, 0, 0, 2, 1, 0, 0, 0, 0]);
         assert!(pairs_count(&[]).is_empty());
+    }
+
+    #[test]
+    fn owners_are_those_of_the_definition() {
+        let counts = [0, 3, 0, 0, 2, 1, 0, 4, 0];
+        let all = [1, 1, 1, 4, 4, 5, 7, 7, 7, 7];
+        for start in 0..10 {
+            for count in 1..12 {
+                let expected = &all[start..(start + count).min(10)];
+                assert_eq!(pairs_owners(&counts, start as u64, count as u32), expected, "{start}, {count}");
+            }
+        }
+        assert!(pairs_owners(&[], 0, 4).is_empty());
     }
 
     #[test]

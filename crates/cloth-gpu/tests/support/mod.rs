@@ -127,6 +127,11 @@ pub(crate) fn soup(count: usize, size: f64, random: &mut Random) -> (Vec<Vec3>, 
     (vertices, triangles)
 }
 
+/// Each vertex moved by at most `by` along each axis.
+pub(crate) fn moved(x: &[Vec3], by: f64, random: &mut Random) -> Vec<Vec3> {
+    x.iter().map(|x| x + random.vector(by)).collect()
+}
+
 /// Dynamic and static bodies, with and without self-collision, some vertices attached.
 pub(crate) fn bodies(random: &mut Random) -> (CollisionMesh, Vec<Vec3>) {
     let kinds = [(true, true), (true, false), (false, false), (false, true), (false, false)];

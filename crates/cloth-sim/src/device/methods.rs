@@ -2,7 +2,7 @@
 
 use super::Tuning;
 use crate::collision::{CollisionMesh, DetectError, Detector};
-use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions, OctreeCounts, OctreeGpu, OctreeOptions};
+use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions, OctreeGpu, OctreeOptions};
 use std::sync::Arc;
 
 /// λ of virtual subdivision where nothing else is asked for (thesis 5.3).
@@ -33,13 +33,7 @@ impl GpuMethod for OctreeGpu {
     }
 
     fn counted(&self) -> Vec<(&'static str, u64)> {
-        let OctreeCounts { levels: [coarsest, finest], registrations, leaves, .. } = Self::counted(self);
-        vec![
-            ("registrations", registrations),
-            ("leaves", leaves),
-            ("coarsest_level", coarsest.into()),
-            ("finest_level", finest.into()),
-        ]
+        Self::counted(self).to_vec()
     }
 }
 
