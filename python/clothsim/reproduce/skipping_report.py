@@ -20,7 +20,7 @@ def tables(runs: Sequence[Run]) -> dict[str, Table]:
     """One row per animation and variant, means over the frames; and every frame."""
     columns = (
         "set", "animation", "what", "pace", "motion [edges per frame]", "variant", "processor [ms]",
-        "BVHU, wall-clock [ms]", "BVHT, wall-clock [ms]", "ETP, wall-clock [ms]", "speed-up to NoDup",
+        "BVHU by wall clock [ms]", "BVHT by wall clock [ms]", "ETP by wall clock [ms]", "speed-up to NoDup",
         "pending pairs", "admissible pairs", "colliding pairs", "memory [B]", "memory per pair [B]",
         "frames that skip [%]", "dangling triangles", "longest session",
     )  # fmt: skip

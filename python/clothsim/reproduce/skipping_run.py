@@ -157,7 +157,7 @@ def run(
     animation = replace(animation, dt=pace * animation.dt)
     sessions = {
         name: collision.SkippingSession(
-            animation.triangles, rest=animation.rest, threads=1,
+            animation.triangles, rest=animation.rest, threads=1, low_curvature=self_collision,
             bodies=_bodies(animation, self_collision=self_collision), **options,
         )
         for name, options in variants.items()

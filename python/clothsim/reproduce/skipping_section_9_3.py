@@ -48,7 +48,7 @@ def tables(measured: runs.Run) -> Mapping[str, Table]:
     """Times and memory, here and quoted; every frame."""
     session = measured.series["SwD"]
     rows: list[Sequence[Any]] = [
-        (f"here, {name}", 1e3 * s.total, s.mean("pending"), s.mean("pair_bytes"), s.bytes_per_pair)
+        (f"here: {name}", 1e3 * s.total, s.mean("pending"), s.mean("pair_bytes"), s.bytes_per_pair)
         for name, s in measured.series.items()
     ]
     for name, milliseconds in QUOTED.items():
@@ -89,7 +89,7 @@ def draw(measured: runs.Run) -> bytes:
     figure = pictures.figure("Section 9.3: the spinning ball", (12.0, 4.8), note)
     left, right = figure.subplots(1, 2)
     pictures.tidy(left, "detection per step, with self-collision [ms]")
-    names = [*(f"here, {name}" for name in measured.series), *QUOTED]
+    names = [*(f"here: {name}" for name in measured.series), *QUOTED]
     times = [*(1e3 * series.total for series in measured.series.values()), *QUOTED.values()]
     colours = ["#2f5d8c"] * len(measured.series) + ["#b9b5ae"] * len(QUOTED)
     places = np.arange(len(names))[::-1]

@@ -52,7 +52,7 @@ def tables(measured: Measured) -> Mapping[str, Table]:
         for experiment, group in SETS.items()
         for item in group
     ]
-    columns = ("set", "animation", "what", "rigid", "cloth", "rigid, paper", "cloth, paper")
+    columns = ("set", "animation", "what", "rigid", "cloth", "rigid (paper)", "cloth (paper)")
     return {"": Table(columns, rows), "moments": snapshots.tables(measured.shots)[""]}
 
 
