@@ -28,7 +28,7 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 
 def bones(pose: mannequin.Pose) -> dict[str, Any]:
-    return mannequin.bones(pose)
+    return mannequin._bones(pose)
 
 
 def ends(bone: Any) -> tuple[Any, Any]:

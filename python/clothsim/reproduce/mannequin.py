@@ -19,8 +19,8 @@ from clothsim.mesh import Mesh
 from clothsim.scene import Scene
 
 __all__ = [
-    "HIP", "PELVIS", "THIGH", "Pose", "Walk", "add", "bones", "frame", "seated", "sit", "skirt", "smooth",
-    "trousers",
+    "HIP", "PELVIS", "THIGH", "WAIST", "Pose", "Walk", "add", "capsules", "frame", "seated", "sit", "skirt", "smooth",
+    "stadium", "trousers",
 ]  # fmt: skip
 
 PELVIS = (0.115, 0.055)  # radius, half length of the straight part, along x
@@ -34,7 +34,7 @@ _TOLERANCE = 2e-3  # of the capsules' triangles [m]
 _SAMPLES = 60.0  # keyframes per second
 STANDING = ANKLE + SHANK + THIGH - HIP[1]  # height of the pelvis with straight legs
 APART = 0.07  # how far the legs point outward when sitting down and standing up [rad]
-_WAIST = 0.045  # of garments, above the middle of the pelvis
+WAIST = 0.045  # of garments, above the middle of the pelvis
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def frame(pose: Pose) -> tuple[Floats, Floats]:
     return np.array(pose.pelvis), _turn(1, pose.yaw)
 
 
-def bones(pose: Pose) -> dict[str, tuple[Floats, Floats, float, float]]:
+def _bones(pose: Pose) -> dict[str, tuple[Floats, Floats, float, float]]:
     """Middle, rotation (the capsule's axis is its y), radius and half length of each capsule."""
     place, body = frame(pose)
     bones: dict[str, tuple[Floats, Floats, float, float]] = {
@@ -204,6 +204,11 @@ def bones(pose: Pose) -> dict[str, tuple[Floats, Floats, float, float]]:
     return bones
 
 
+def capsules(pose: Pose) -> dict[str, tuple[Floats, Floats, float, float]]:
+    """Middle, rotation (the axis is its y), radius and half length of the figure's capsules by name."""
+    return _bones(pose)
+
+
 def _axis_angle(matrix: Floats) -> dict[str, Any]:
     axis = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
     length = float(np.linalg.norm(axis))
@@ -216,7 +221,7 @@ def _axis_angle(matrix: Floats) -> dict[str, Any]:
 def add(scene: Scene, motion: Motion, duration: float, *, friction: float | None = None) -> None:
     """Add the figure's capsules to a scene as rigid colliders; the pelvis is called ``"pelvis"``."""
     times = np.linspace(0.0, duration, math.ceil(duration * _SAMPLES) + 1)
-    poses = [bones(motion(float(t))) for t in times]
+    poses = [_bones(motion(float(t))) for t in times]
     extra = {} if friction is None else {"friction": friction}
     for name, (_, _, radius, half) in poses[0].items():
         keyframes = [
@@ -230,7 +235,7 @@ def add(scene: Scene, motion: Motion, duration: float, *, friction: float | None
 # Garments: meshes on the standing figure, at least ``ease`` away from it --------------------------------------------
 
 
-def _ring(radius: float, straight: float, count: int) -> Floats:
+def stadium(radius: float, straight: float, count: int) -> Floats:
     """Points at equal distances along a stadium, straight sides along x: (count, 2) as x, z; from +z towards +x."""
     quarter = 0.5 * math.pi * radius
     around = 4.0 * quarter + 4.0 * straight
@@ -267,11 +272,11 @@ def skirt(
     ``around`` (even) vertices in each of ``rows`` + 1 rings; ``flare`` is how much wider the hem is than the waist, in
     radius [m].
     """
-    top = STANDING + _WAIST
+    top = STANDING + WAIST
     points, rings = [], []
     for r in range(rows + 1):
         part = r / rows
-        ring = _ring(PELVIS[0] + ease + flare * part, PELVIS[1], around)
+        ring = stadium(PELVIS[0] + ease + flare * part, PELVIS[1], around)
         rings.append(list(range(r * around, (r + 1) * around)))
         points.append(np.column_stack([ring[:, 0], np.full(around, top - length * part), ring[:, 1]]))
     return Mesh(np.concatenate(points), _tube(rings)), rings[0]
@@ -284,9 +289,9 @@ def trousers(around: int, *, ease: float = 0.02, hem: float = 0.16) -> tuple[Mes
     back; each half of the last ring closes with the seam to the first ring of a leg. ``hem`` is the height of the
     leg's end above the sole [m].
     """
-    top, fork = STANDING + _WAIST, STANDING - PELVIS[0] - 0.02
+    top, fork = STANDING + WAIST, STANDING - PELVIS[0] - 0.02
     radius, straight = PELVIS[0] + ease, PELVIS[1]
-    ring = _ring(radius + 0.006, straight + 0.004, around)
+    ring = stadium(radius + 0.006, straight + 0.004, around)
     cell = float(np.linalg.norm(ring[1] - ring[0]))
     rows = max(2, round((top - fork) / cell))
     points: list[Floats] = []

@@ -73,7 +73,7 @@ class Garment:
         """Make the frames."""
         meshes = {
             name: capsule(radius, half, *self.capsules)
-            for name, (_, _, radius, half) in mannequin.bones(mannequin.Pose()).items()
+            for name, (_, _, radius, half) in mannequin.capsules(mannequin.Pose()).items()
         }
         layers = [(name, rows) for name, rows in zip(("inner layer", "outer layer"), self.rows, strict=True)]
         triangles, parts = join([
@@ -89,7 +89,7 @@ class Garment:
 
         def at(time: float) -> Floats:
             pose = replace(self.walk(self.start + time), shoulder=SHOULDERS, elbow=ELBOWS)
-            bones = mannequin.bones(pose)
+            bones = mannequin.capsules(pose)
             middle, turn = mannequin.frame(pose)
             hull = _hull(bones, middle, turn)
             cloth = [
