@@ -132,14 +132,14 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> Any:
 def test_quick_variants_agree_with_the_paper(quick: Any, name: str) -> None:
     entry, out = find(name), quick(name)
     facts = json.loads((out / f"{entry.stem}.json").read_text())
-    assert facts["line"].startswith("the thesis: ")
+    assert facts["line"].startswith(f"the {entry.source}: ")
     assert " / here: " in facts["line"]
     assert facts["checks"]
     if name != "table-4.1":  # its check compares times, which no test may depend on
         assert [check for check in facts["checks"] if not check["passed"]] == []
     assert (out / f"{entry.stem}.png").read_bytes().startswith(b"\x89PNG")
     head = (out / f"{entry.stem}.csv").read_text()
-    assert head.startswith("# figure: Wong 2014, ")
+    assert head.startswith(f"# figure: {entry.paper}, ")
     assert f"# made by: clothsim {facts['parameters']['made by'].split()[1]}" in head
     assert "--quick" in facts["parameters"]["made by"]
     assert rows(out / f"{entry.stem}.csv")

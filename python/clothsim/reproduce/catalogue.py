@@ -66,6 +66,11 @@ class Entry:
         return "2010-" if self.paper == SKIPPING else ""
 
     @property
+    def source(self) -> str:
+        """What the comparison calls the paper."""
+        return "paper" if self.paper == SKIPPING else "thesis"
+
+    @property
     def command(self) -> str | None:
         """How to get it."""
         return f"clothsim reproduce {self.name} -o out/{self.stem}" if self.state == REPRODUCED else None
@@ -177,13 +182,17 @@ CATALOGUE = (
     _skipping("1", "The feature assignment for two triangles", DRAWING),
     _skipping("2", "The changes of a triangle's normal vector; its canonical cone", DRAWING),
     _skipping("3", "Movement without collision", DRAWING),
-    _skipping("4", "Expected free movement distance; probability of penetration free movement"),
-    _skipping("5", "Snapshots of experiment set one"),
-    _skipping("6", "Snapshots of experiment set two"),
-    _skipping("7", "Experiment set two: performance statistics of animation two, three and four"),
-    _skipping("1", "The model complexities", INPUT, kind="table"),
-    _skipping("2", "Performance statistics of experiment set one", kind="table"),
-    _skipping("9.3", "Comparison with other methods: spinning ball", kind="section"),
+    _skipping(
+        "4", "Expected free movement distance; probability of penetration free movement", module="skipping_figure_4"
+    ),
+    _skipping("5", "Snapshots of experiment set one", module="skipping_figure_5"),
+    _skipping("6", "Snapshots of experiment set two", module="skipping_figure_6"),
+    _skipping(
+        "7", "Experiment set two: performance statistics of animation two, three and four", module="skipping_figure_7"
+    ),
+    _skipping("1", "The model complexities", module="skipping_table_1", kind="table"),
+    _skipping("2", "Performance statistics of experiment set one", module="skipping_table_2", kind="table"),
+    _skipping("9.3", "Comparison with other methods: spinning ball", module="skipping_section_9_3", kind="section"),
 )
 
 

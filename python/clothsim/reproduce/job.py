@@ -53,7 +53,7 @@ class Outcome:
     @property
     def line(self) -> str:
         """The comparison in one line."""
-        return f"the thesis: {self.thesis} / here: {self.here}"
+        return f"the {self.entry.source}: {self.thesis} / here: {self.here}"
 
     def facts(self) -> dict[str, Any]:
         """Everything, for JSON."""
