@@ -13,7 +13,7 @@ Examples
 (121, 3)
 """
 
-from clothsim import bending, collision, errors, friction
+from clothsim import bending, collision, errors, friction, study
 from clothsim._core import __version__
 from clothsim.errors import (
     CheckpointError,
@@ -69,4 +69,5 @@ __all__ = [
     "friction",
     "materials",
     "record",
+    "study",
 ]

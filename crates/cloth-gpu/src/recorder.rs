@@ -163,6 +163,13 @@ impl<'a> Recorder<'a> {
         );
     }
 
+    /// Copies the first elements of an array into another one.
+    pub(crate) fn copy<T>(&mut self, from: &Array<T>, to: &Array<T>, elements: usize) {
+        self.pass = None;
+        let bytes = (elements * size_of::<T>()) as u64;
+        self.encoder.copy_buffer_to_buffer(&from.raw, 0, &to.raw, 0, bytes);
+    }
+
     /// Copies elements back to the host; returns the index to ask the [`Answer`] with.
     ///
     /// # Panics

@@ -41,16 +41,7 @@ pub struct Topology {
 impl Topology {
     /// Connectivity of `triangles` over `vertex_count` vertices. Indices must be in range ([`crate::TriMesh::check`]).
     pub fn new(vertex_count: usize, triangles: &[[u32; 3]]) -> Self {
-        // (lower, higher, triangle, side), sorted: runs of equal vertex pairs are the edges.
-        let mut sides: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(3 * triangles.len());
-        for (t, tri) in triangles.iter().enumerate() {
-            for side in 0..3 {
-                let (a, b) = (tri[side], tri[(side + 1) % 3]);
-                sides.push((a.min(b), a.max(b), t as u32, side as u8));
-            }
-        }
-        sides.sort_unstable();
-
+        let sides = sorted_sides(vertex_count, triangles);
         let mut topology =
             Self { vertex_count, triangle_edges: vec![[NONE; 3]; triangles.len()], ..Self::default() };
         for run in sides.chunk_by(|p, q| (p.0, p.1) == (q.0, q.1)) {
@@ -126,9 +117,61 @@ impl Topology {
     }
 }
 
+/// (lower vertex, higher vertex, triangle, side) of all triangles' sides, sorted: runs of equal vertex pairs are the edges.
+///
+/// A place for each by its lower vertex, then an order among the few with the same one.
+fn sorted_sides(vertex_count: usize, triangles: &[[u32; 3]]) -> Vec<(u32, u32, u32, u8)> {
+    let ends = |tri: &[u32; 3], side: usize| {
+        let (a, b) = (tri[side], tri[(side + 1) % 3]);
+        (a.min(b), a.max(b))
+    };
+    let mut place = vec![0_u32; vertex_count + 1];
+    for tri in triangles {
+        for side in 0..3 {
+            place[ends(tri, side).0 as usize + 1] += 1;
+        }
+    }
+    for v in 0..vertex_count {
+        place[v + 1] += place[v];
+    }
+    let mut sides = vec![(0, 0, 0, 0); 3 * triangles.len()];
+    for (t, tri) in triangles.iter().enumerate() {
+        for side in 0..3 {
+            let (lower, higher) = ends(tri, side);
+            let place = &mut place[lower as usize];
+            sides[*place as usize] = (lower, higher, t as u32, side as u8);
+            *place += 1;
+        }
+    }
+    for same in sides.chunk_by_mut(|p, q| p.0 == q.0) {
+        same.sort_unstable();
+    }
+    sides
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sides_come_in_order() {
+        // A fan of many triangles around vertex 7, walked in both directions.
+        let triangles: Vec<[u32; 3]> = (0..40)
+            .map(|k| {
+                let (a, b) = (8 + k * 17 % 40, 8 + (k * 17 + 1) % 40);
+                if k % 2 == 0 { [7, a, b] } else { [b, a, 7] }
+            })
+            .chain([[0, 1, 2], [2, 1, 3]])
+            .collect();
+        let sides = sorted_sides(48, &triangles);
+        assert!(sides.is_sorted() && sides.len() == 3 * triangles.len());
+        for &(lower, higher, t, side) in &sides {
+            let tri = triangles[t as usize];
+            let (a, b) = (tri[side as usize], tri[(side as usize + 1) % 3]);
+            assert_eq!((lower, higher), (a.min(b), a.max(b)));
+        }
+        assert_eq!(Topology::new(48, &triangles).vertex_triangles(7).len(), 40);
+    }
 
     #[test]
     fn two_triangles_make_one_hinge() {

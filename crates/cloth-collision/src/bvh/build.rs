@@ -22,6 +22,8 @@ pub(super) struct Tree {
     pub(super) vertex_ids: Vec<[u32; LANES]>,
     /// Edges owned by the triangles of a leaf, in blocks.
     pub(super) edge_ids: Vec<[u32; LANES]>,
+    /// Their vertices, `[end][lane]`, [`NONE`] in unused lanes.
+    pub(super) edge_ends: Vec<[[u32; LANES]; 2]>,
     /// The blocks above the leaves.
     pub(super) inner: Vec<Inner>,
     pub(super) roots: Vec<Root>,
@@ -60,6 +62,7 @@ impl Tree {
             + held(&self.corners)
             + held(&self.vertex_ids)
             + held(&self.edge_ids)
+            + held(&self.edge_ends)
             + held(&self.inner)
             + held(&self.roots)
     }
@@ -200,6 +203,13 @@ fn push_leaf(mesh: &CollisionMesh, items: &[Item], tree: &mut Tree) {
     }
     vertices.push_blocks(&mut tree.vertex_ids);
     edges.push_blocks(&mut tree.edge_ids);
+    for ids in &tree.edge_ids[first_edge_block as usize..] {
+        let mut ends = [[NONE; LANES]; 2];
+        for (lane, &e) in ids.iter().enumerate().filter(|&(_, &e)| e != NONE) {
+            [ends[0][lane], ends[1][lane]] = mesh.edges[e as usize];
+        }
+        tree.edge_ends.push(ends);
+    }
     tree.triangle_ids.push(triangles);
     tree.corners.push(corners);
     tree.leaves.push(Leaf {

@@ -25,8 +25,8 @@ pub(super) struct TrianglePairs {
     pub(super) joined: Vec<[u32; 2]>,
 }
 
-/// Pairs of features of the leaves `a` and `b` (once each if they are equal) whose boxes overlap. Pairs that share a
-/// vertex are among them, and pairs with an unused lane ([`cloth_mesh::NONE`]) where boxes reach to infinity.
+/// Pairs of features of the leaves `a` and `b` (once each if they are equal) that share no vertex and whose boxes overlap.
+/// Pairs with an unused lane ([`cloth_mesh::NONE`]) are among them where boxes reach to infinity.
 #[inline]
 pub(super) fn features<const ENDS: usize>(
     tree: &Tree,
@@ -122,30 +122,32 @@ fn features_with<const ENDS: usize>(
     let sides = [(leaf_a, b, box_b), (leaf_b, a, box_a)];
     for &(leaf, other, other_box) in &sides[..if a == b { 1 } else { 2 }] {
         let (blocks, ids) = (&boxes.blocks[other as usize], &tree.triangle_ids[other as usize]);
+        let corners = &tree.corners[other as usize];
         for block in leaf.vertex_blocks[0]..leaf.vertex_blocks[1] {
             let vertices = &boxes.vertex_blocks[block as usize];
             for lane in lanes(compare.overlaps(other_box, vertices)) {
                 let v = tree.vertex_ids[block as usize][lane];
-                for hit in lanes(compare.overlaps(&(vertices, lane), blocks)) {
-                    out.vertex_triangle.push([v, ids[hit]]);
-                }
+                let hits = compare.overlaps(&(vertices, lane), blocks) & !compare.has_corner(v, corners);
+                compare.push(hits, v, ids, &mut out.vertex_triangle);
             }
         }
     }
 
     for block_a in leaf_a.edge_blocks[0]..leaf_a.edge_blocks[1] {
         let edges = &boxes.edge_blocks[block_a as usize];
+        let [starts, ends] = &tree.edge_ends[block_a as usize];
         for lane in lanes(compare.overlaps(box_b, edges)) {
             let e = tree.edge_ids[block_a as usize][lane];
             let first = if a == b { block_a } else { leaf_b.edge_blocks[0] };
             for block_b in first..leaf_b.edge_blocks[1] {
-                let mut hits = compare.overlaps(&(edges, lane), &boxes.edge_blocks[block_b as usize]);
+                let ends_b = &tree.edge_ends[block_b as usize];
+                let mut hits = compare.overlaps(&(edges, lane), &boxes.edge_blocks[block_b as usize])
+                    & !compare.has_corner(starts[lane], ends_b)
+                    & !compare.has_corner(ends[lane], ends_b);
                 if a == b && block_a == block_b {
                     hits &= !0 << (lane + 1);
                 }
-                for hit in lanes(hits) {
-                    out.edge_edge.push([e, tree.edge_ids[block_b as usize][hit]]);
-                }
+                compare.push(hits, e, &tree.edge_ids[block_b as usize], &mut out.edge_edge);
             }
         }
     }

@@ -115,7 +115,7 @@ impl Detector for Bvh {
             self.refit_still(mesh, query, pool);
         }
         let fitted = Instant::now();
-        let scene = narrow::Scene::new(mesh, query);
+        let scene = narrow::Scene::new_in(mesh, query, pool);
         let visit = || Streaming::new(narrow::Narrow::new(&scene));
         let (visits, counts) = if is_moving {
             traverse(&self.tree, &self.moving, mesh, pool, visit)

@@ -1,62 +1,56 @@
 //! The narrow phase of a traversal: candidates in, contacts out.
 
 use super::traverse::{Candidates, Sink};
-use crate::ccd::filter::{
-    Row, filter, four_edge_edges_apart, four_edge_edges_maybe_apart, four_vertex_triangles_apart,
-    four_vertex_triangles_maybe_apart, row,
-};
-use crate::ccd::{edge_edge_march, vertex_triangle_march};
-use crate::{CollisionMesh, Contacts, Mode, Query, Vec3};
+use crate::ccd::batch::Batch;
+use crate::ccd::instructions::Instructions;
+use crate::ccd::motions::Motions;
+use crate::{CollisionMesh, Contacts, Mode, Query, StencilKind, Vec3};
 use cloth_mesh::NONE;
-
-/// Both ends of a vertex's motion, in one cache line.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
-struct Motion([Row; 2]);
 
 /// What the narrow phase knows of a query.
 pub(crate) struct Scene<'a> {
     mesh: &'a CollisionMesh,
     query: &'a Query<'a>,
-    motion: Vec<Motion>,
+    motions: Motions,
+    /// Attachments or the query's mask exclude pairs.
+    has_exclusions: bool,
 }
 
 impl<'a> Scene<'a> {
     pub(crate) fn new(mesh: &'a CollisionMesh, query: &'a Query<'a>) -> Self {
-        let start = if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 };
-        Self {
-            mesh,
-            query,
-            motion: start.iter().zip(query.x_t1).map(|(a, b)| Motion([row(a), row(b)])).collect(),
-        }
+        Self::with(mesh, query, Motions::new(start(query), query.x_t1, query.thickness))
     }
 
+    /// [`Scene::new`] on a pool.
+    pub(crate) fn new_in(mesh: &'a CollisionMesh, query: &'a Query<'a>, pool: &rayon::ThreadPool) -> Self {
+        Self::with(mesh, query, Motions::new_in(start(query), query.x_t1, query.thickness, pool))
+    }
+
+    fn with(mesh: &'a CollisionMesh, query: &'a Query<'a>, motions: Motions) -> Self {
+        Self { mesh, query, motions, has_exclusions: mesh.has_attachments() || query.active.is_some() }
+    }
+
+    /// Whether a pair that shares no vertex is to be decided. The traversal has seen to the bodies.
+    #[inline(always)]
     fn is_wanted(&self, first: &[u32], second: &[u32]) -> bool {
-        // The traversal has seen to the bodies.
-        !first.iter().any(|v| second.contains(v))
-            && !self.mesh.is_attached(first, second)
-            && self.query.active.is_none_or(|mask| first.iter().chain(second).any(|&v| mask[v as usize]))
-    }
-
-    #[inline]
-    fn rows(&self, vertices: [u32; 4]) -> [&Row; 8] {
-        let motion = |k: usize| &self.motion[vertices[k] as usize].0;
-        let (a, b, c, d) = (motion(0), motion(1), motion(2), motion(3));
-        [&a[0], &b[0], &c[0], &d[0], &a[1], &b[1], &c[1], &d[1]]
-    }
-
-    fn points(&self, vertices: [u32; 4]) -> [Vec3; 8] {
-        self.rows(vertices).map(|row| Vec3::new(row[0], row[1], row[2]))
+        !self.has_exclusions
+            || (!self.mesh.is_attached(first, second)
+                && self.query.active.is_none_or(|mask| first.iter().chain(second).any(|&v| mask[v as usize])))
     }
 }
 
-type Pair = ([u32; 2], [u32; 4]);
+/// The positions at the start of the motion.
+fn start<'a>(query: &Query<'a>) -> &'a [Vec3] {
+    if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 }
+}
 
 /// The contacts of one task.
 pub(crate) struct Narrow<'a> {
     scene: &'a Scene<'a>,
-    waiting: Vec<Pair>,
-    left: Vec<Pair>,
+    /// Pairs that wait, and their vertices.
+    waiting: Vec<[u32; 2]>,
+    vertices: Vec<[u32; 4]>,
+    batch: Batch,
     vertex_triangle: Vec<([u32; 2], f64)>,
     edge_edge: Vec<([u32; 2], f64)>,
     candidates_vertex_triangle: u64,
@@ -69,7 +63,8 @@ impl<'a> Narrow<'a> {
         Self {
             scene,
             waiting: vec![],
-            left: vec![],
+            vertices: vec![],
+            batch: Batch::default(),
             vertex_triangle: vec![],
             edge_edge: vec![],
             candidates_vertex_triangle: 0,
@@ -79,61 +74,71 @@ impl<'a> Narrow<'a> {
     }
 }
 
-impl Sink for Narrow<'_> {
-    fn take(&mut self, candidates: &mut Candidates) {
-        let Self { scene, waiting, left, .. } = self;
-        let (mesh, thickness) = (scene.mesh, scene.query.thickness);
-        let rows = |pair: &Pair| scene.rows(pair.1);
-        let time = |t: f64| if scene.query.mode == Mode::Continuous { t } else { 1.0 };
-
+impl Narrow<'_> {
+    /// Decides the waiting pairs: their contacts.
+    fn decide(&mut self, kind: StencilKind) {
+        let Self { scene, waiting, vertices, batch, .. } = self;
+        let left = batch.decide(Instructions::widest(), kind, &scene.motions, vertices);
+        self.root_searches += left as u64;
+        let is_continuous = scene.query.mode == Mode::Continuous;
+        let contacts = batch
+            .contacts()
+            .map(|(pair, time)| (waiting[pair as usize], if is_continuous { time } else { 1.0 }));
+        match kind {
+            StencilKind::VertexTriangle => {
+                self.candidates_vertex_triangle += waiting.len() as u64;
+                self.vertex_triangle.extend(contacts);
+            }
+            StencilKind::EdgeEdge => {
+                self.candidates_edge_edge += waiting.len() as u64;
+                self.edge_edge.extend(contacts);
+            }
+        }
         waiting.clear();
+        vertices.clear();
+    }
+}
+
+impl Sink for Narrow<'_> {
+    #[allow(
+        clippy::needless_bitwise_bool,
+        reason = "a branch per comparison costs more than the comparisons"
+    )]
+    fn take(&mut self, candidates: &mut Candidates) {
+        let Self { scene, waiting, vertices, .. } = self;
+        let mesh = scene.mesh;
+        // Every candidate is written, and the next one over it if it is not wanted: no branch on what is hard to foresee.
+        let mut count = 0;
+        waiting.resize(candidates.vertex_triangle.len(), [0; 2]);
+        vertices.resize(candidates.vertex_triangle.len(), [0; 4]);
         for [v, t] in candidates.vertex_triangle.drain(..) {
             if v != NONE && t != NONE {
                 let [a, b, c] = mesh.triangles[t as usize];
-                if scene.is_wanted(&[v], &[a, b, c]) {
-                    waiting.push(([v, t], [v, a, b, c]));
-                }
+                (waiting[count], vertices[count]) = ([v, t], [v, a, b, c]);
+                let is_stranger = (v != a) & (v != b) & (v != c);
+                count += usize::from(is_stranger && scene.is_wanted(&[v], &[a, b, c]));
             }
         }
-        self.candidates_vertex_triangle += waiting.len() as u64;
-        left.clear();
-        filter(waiting, rows, |r| four_vertex_triangles_maybe_apart(r, thickness), |pair| left.push(pair));
-        filter(
-            left,
-            rows,
-            |r| four_vertex_triangles_apart(r, thickness),
-            |(pair, vertices)| {
-                self.root_searches += 1;
-                if let Some(t) = vertex_triangle_march(&scene.points(vertices), thickness) {
-                    self.vertex_triangle.push((pair, time(t)));
-                }
-            },
-        );
+        waiting.truncate(count);
+        vertices.truncate(count);
+        self.decide(StencilKind::VertexTriangle);
 
-        waiting.clear();
+        let Self { scene, waiting, vertices, .. } = self;
+        let mut count = 0;
+        waiting.resize(candidates.edge_edge.len(), [0; 2]);
+        vertices.resize(candidates.edge_edge.len(), [0; 4]);
         for [e, f] in candidates.edge_edge.drain(..) {
             if e != NONE && f != NONE {
                 let pair = [e.min(f), e.max(f)];
-                let (a, b) = (mesh.edges[pair[0] as usize], mesh.edges[pair[1] as usize]);
-                if scene.is_wanted(&a, &b) {
-                    waiting.push((pair, [a[0], a[1], b[0], b[1]]));
-                }
+                let ([a, b], [c, d]) = (mesh.edges[pair[0] as usize], mesh.edges[pair[1] as usize]);
+                (waiting[count], vertices[count]) = (pair, [a, b, c, d]);
+                let are_strangers = (a != c) & (a != d) & (b != c) & (b != d);
+                count += usize::from(are_strangers && scene.is_wanted(&[a, b], &[c, d]));
             }
         }
-        self.candidates_edge_edge += waiting.len() as u64;
-        left.clear();
-        filter(waiting, rows, |r| four_edge_edges_maybe_apart(r, thickness), |pair| left.push(pair));
-        filter(
-            left,
-            rows,
-            |r| four_edge_edges_apart(r, thickness),
-            |(pair, vertices)| {
-                self.root_searches += 1;
-                if let Some(t) = edge_edge_march(&scene.points(vertices), thickness) {
-                    self.edge_edge.push((pair, time(t)));
-                }
-            },
-        );
+        waiting.truncate(count);
+        vertices.truncate(count);
+        self.decide(StencilKind::EdgeEdge);
     }
 }
 
@@ -148,9 +153,59 @@ pub(crate) fn merge<'a>(sinks: impl Iterator<Item = Narrow<'a>>) -> Contacts {
         out.stats.candidates_edge_edge += sink.candidates_edge_edge;
         out.stats.root_searches += sink.root_searches;
     }
-    vertex_triangle.sort_unstable_by_key(|c| c.0);
-    edge_edge.sort_unstable_by_key(|c| c.0);
+    sort_by_pair(&mut vertex_triangle);
+    sort_by_pair(&mut edge_edge);
     (out.vertex_triangle, out.time_vertex_triangle) = vertex_triangle.into_iter().unzip();
     (out.edge_edge, out.time_edge_edge) = edge_edge.into_iter().unzip();
     out
+}
+
+/// Sorts contacts by their pairs, each of which is there once.
+fn sort_by_pair(contacts: &mut Vec<([u32; 2], f64)>) {
+    let first_count = contacts.iter().map(|c| c.0[0] as usize + 1).max().unwrap_or(0);
+    // Few contacts among many features: not worth a look at each feature.
+    if first_count > 8 * contacts.len() {
+        contacts.sort_unstable_by_key(|c| c.0);
+        return;
+    }
+    // A place for each by its first feature, then an order among the few with the same one.
+    let mut place = vec![0_u32; first_count + 1];
+    for contact in &*contacts {
+        place[contact.0[0] as usize + 1] += 1;
+    }
+    for k in 0..first_count {
+        place[k + 1] += place[k];
+    }
+    let mut sorted = vec![([0; 2], 0.0); contacts.len()];
+    for &contact in &*contacts {
+        let place = &mut place[contact.0[0] as usize];
+        sorted[*place as usize] = contact;
+        *place += 1;
+    }
+    for same in sorted.chunk_by_mut(|a, b| a.0[0] == b.0[0]) {
+        same.sort_unstable_by_key(|c| c.0[1]);
+    }
+    *contacts = sorted;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sort_by_pair;
+
+    #[test]
+    fn contacts_are_sorted_whatever_their_number() {
+        for (count, features) in [(0, 1), (1, 1), (3, 1000), (2000, 5), (2000, 300), (2000, 100_000)] {
+            let mut state = 1_u32;
+            let mut random = |below: u32| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 8) % below
+            };
+            let mut contacts: Vec<_> =
+                (0..count).map(|k| ([random(features), 10_000 * random(9) + k], f64::from(k))).collect();
+            let mut expected = contacts.clone();
+            expected.sort_by_key(|c| c.0);
+            sort_by_pair(&mut contacts);
+            assert_eq!(contacts, expected);
+        }
+    }
 }

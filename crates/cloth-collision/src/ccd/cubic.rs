@@ -1,14 +1,13 @@
 //! The coplanarity cubic in Bernstein form, with an error bound.
 
 use super::filter::determinant;
-use super::lanes::Vector;
-use crate::Vec3;
+use super::lanes::{Lanes, Mask, Vector};
 
 /// Σ b_i C(3,i) t^i (1−t)^(3−i) on \[0, 1\], known to ± `error` there.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cubic {
-    pub(crate) b: [f64; 4],
-    pub(crate) error: f64,
+pub(crate) struct Cubic<L> {
+    pub(crate) b: [L; 4],
+    pub(crate) error: L,
 }
 
 /// Steps of Bézier clipping before the present bound is returned as it stands.
@@ -19,121 +18,164 @@ const MAX_NEWTON: usize = 16;
 /// approached to it.
 const ROOT_STEP: f64 = 1e-10;
 
-impl Cubic {
+/// Where a polynomial less its error bound, divided by the sign of its first coefficient, stands.
+struct Shifted<L: Lanes> {
+    c: [L; 4],
+    /// The first coefficient is not beyond the error bound.
+    starts_at_root: L::Mask,
+    is_positive: L::Mask,
+}
+
+impl<L: Lanes> Cubic<L> {
     /// det(x, y, z) of three vectors that move linearly from `[0]` to `[1]`.
-    #[inline]
-    pub(crate) fn determinant(x: &[Vec3; 2], y: &[Vec3; 2], z: &[Vec3; 2]) -> Self {
-        let (b, error) = determinant(x.map(Vector::from), y.map(Vector::from), z.map(Vector::from));
+    #[inline(always)]
+    pub(crate) fn determinant(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Vector<L>; 2]) -> Self {
+        let (b, error) = determinant(x, y, z);
         Self { b, error }
     }
 
-    /// A time that is not later than the first root in \[t, 1\]; None if there is certainly no root.
-    pub(crate) fn first_root_bound(&self, t: f64) -> Option<f64> {
-        let c = restrict(&self.b, t);
-        if !(c[0].abs() > self.error) {
-            return Some(t);
+    /// Where there is certainly no root in \[t, 1\]; elsewhere a time that is not later than the first one.
+    #[inline(always)]
+    pub(crate) fn first_root_bound(&self, t: L) -> (L::Mask, L) {
+        let Shifted { c, starts_at_root, is_positive } = self.shifted(t);
+        let rootless = is_positive & !starts_at_root;
+        let open = !(is_positive | starts_at_root);
+        if !open.any() {
+            return (rootless, t);
         }
-        // The polynomial less its error bound: a true root cannot come before its first root.
-        let sign = c[0].signum();
-        let c = c.map(|value| value * sign - self.error);
-        if c.iter().all(|&v| v > 0.0) {
-            return None;
+        let (found, x) = approach(&c, open);
+        let bound = L::select(found, t + x * (L::splat(1.0) - t), t);
+        let hard = open & !found;
+        if !hard.any() {
+            return (rootless, bound);
         }
-        if let Some(x) = approach(&c) {
-            return Some(t + x * (1.0 - t));
-        }
-        self.clip(t)
+        let (none, clipped) = self.clip(t, hard);
+        (rootless | none, L::select(hard, clipped, bound))
     }
 
-    /// [`Cubic::first_root_bound`] without luck: clips away what lies before the hull of the control points reaches
-    /// zero, again and again.
-    fn clip(&self, t: f64) -> Option<f64> {
-        let mut t = t;
+    /// The polynomial less its error bound on \[t, 1\]: a true root cannot come before its first root.
+    #[inline(always)]
+    fn shifted(&self, t: L) -> Shifted<L> {
+        let zero = L::splat(0.0);
+        let c = restrict(&self.b, t);
+        let starts_at_root = !c[0].abs().greater(self.error);
+        let sign = L::select(c[0].greater(zero), L::splat(1.0), L::splat(-1.0));
+        // Not `map`: what is not inlined here knows nothing of the vector instructions.
+        let c = [
+            c[0] * sign - self.error,
+            c[1] * sign - self.error,
+            c[2] * sign - self.error,
+            c[3] * sign - self.error,
+        ];
+        Shifted { c, starts_at_root, is_positive: all_positive(&c) }
+    }
+
+    /// [`Cubic::first_root_bound`] without luck, where `wanted`: clips away what lies before the hull of the control
+    /// points reaches zero, again and again.
+    #[inline(always)]
+    fn clip(&self, t: L, wanted: L::Mask) -> (L::Mask, L) {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let (mut t, mut moving, mut rootless) = (t, wanted, zero.greater(zero));
         for _ in 0..MAX_CLIPS {
-            let c = restrict(&self.b, t);
-            if !(c[0].abs() > self.error) {
-                return Some(t);
+            let Shifted { c, starts_at_root, is_positive } = self.shifted(t);
+            rootless = rootless | (moving & is_positive & !starts_at_root);
+            moving = moving & !(is_positive | starts_at_root);
+            if !moving.any() {
+                break;
             }
-            let sign = c[0].signum();
-            let c = c.map(|value| value * sign - self.error);
-            if c.iter().all(|&v| v > 0.0) {
-                return None;
-            }
-            let mut first = 1.0f64;
+            let mut first = one;
             for i in 0..3 {
                 for j in i + 1..4 {
-                    if c[i] > 0.0 && c[j] <= 0.0 {
-                        first = first.min((i as f64 + (j - i) as f64 * c[i] / (c[i] - c[j])) / 3.0);
-                    }
+                    let falls = c[i].greater(zero) & !c[j].greater(zero);
+                    let x = (L::splat(i as f64) + L::splat((j - i) as f64) * c[i] / (c[i] - c[j]))
+                        / L::splat(3.0);
+                    first = L::select(falls, x.min(first), first);
                 }
             }
             // The rounding of `first`; that of the sum is in the error bound.
-            let step = first * (1.0 - t) * (1.0 - 8.0 * f64::EPSILON);
-            if step < ROOT_STEP {
-                return Some(t);
-            }
-            t += step;
-            if t >= 1.0 {
-                return Some(1.0 - f64::EPSILON);
-            }
+            let step = first * (one - t) * L::splat(1.0 - 8.0 * f64::EPSILON);
+            moving = moving & !L::splat(ROOT_STEP).greater(step);
+            let next = t + step;
+            let at_end = !one.greater(next);
+            t = L::select(moving, L::select(at_end, L::splat(1.0 - f64::EPSILON), next), t);
+            moving = moving & !at_end;
         }
-        Some(t)
+        (rootless, t)
     }
 }
 
-/// A parameter shortly before a root of the polynomial with coefficients `c`, c0 > 0 ≥ c3, up to which it certainly
-/// has none; None if this simple way does not find one.
-#[inline]
-fn approach(c: &[f64; 4]) -> Option<f64> {
-    if c[3] > 0.0 {
-        return None;
-    }
-    let slopes = [3.0 * (c[1] - c[0]), 3.0 * (c[2] - 2.0 * c[1] + c[0]), c[3] - 3.0 * (c[2] - c[1]) - c[0]];
-    let (mut lo, mut hi, mut x) = (0.0, 1.0, c[0] / (c[0] - c[3]));
+#[inline(always)]
+fn all_positive<L: Lanes>(c: &[L; 4]) -> L::Mask {
+    let zero = L::splat(0.0);
+    c[0].greater(zero) & c[1].greater(zero) & c[2].greater(zero) & c[3].greater(zero)
+}
+
+/// Where `wanted` and found: a parameter shortly before a root of the polynomial with coefficients `c`, c0 > 0 ≥ c3, up
+/// to which it certainly has none. Not all are found in this simple way.
+#[inline(always)]
+fn approach<L: Lanes>(c: &[L; 4], wanted: L::Mask) -> (L::Mask, L) {
+    let (zero, half, two, three) = (L::splat(0.0), L::splat(0.5), L::splat(2.0), L::splat(3.0));
+    let wanted = wanted & !c[3].greater(zero);
+    let mut running = wanted;
+    let slopes =
+        [three * (c[1] - c[0]), three * (c[2] - two * c[1] + c[0]), c[3] - three * (c[2] - c[1]) - c[0]];
+    let (mut lo, mut hi, mut x) = (zero, L::splat(1.0), c[0] / (c[0] - c[3]));
     for _ in 0..MAX_NEWTON {
-        let value = c[0] + x * (slopes[0] + x * (slopes[1] + x * slopes[2]));
-        let slope = slopes[0] + x * (2.0 * slopes[1] + x * 3.0 * slopes[2]);
-        if value > 0.0 {
-            lo = x;
-        } else {
-            hi = x;
-        }
-        let mut next = x - value / slope;
-        if !(next > lo && next < hi) {
-            next = 0.5 * (lo + hi);
-        }
-        let arrived = (next - x).abs() < 0.1 * ROOT_STEP;
-        x = next;
-        if arrived {
+        if !running.any() {
             break;
         }
+        let value = c[0] + x * (slopes[0] + x * (slopes[1] + x * slopes[2]));
+        let slope = slopes[0] + x * (two * slopes[1] + x * three * slopes[2]);
+        let is_before = value.greater(zero);
+        lo = L::select(is_before, x, lo);
+        hi = L::select(is_before, hi, x);
+        let next = x - value / slope;
+        let next = L::select(next.greater(lo) & hi.greater(next), next, half * (lo + hi));
+        let arrived = L::splat(0.1 * ROOT_STEP).greater((next - x).abs());
+        x = L::select(running, next, x);
+        running = running & !arrived;
     }
-    let end = x - ROOT_STEP;
-    (end > 0.0 && is_positive(c, end)).then_some(end)
+    let end = x - L::splat(ROOT_STEP);
+    let found = wanted & end.greater(zero);
+    (found & is_positive_until(c, end, found), end)
 }
 
-/// Whether the coefficients on \[0, x\] are positive, or those on both halves of it.
-#[inline]
-fn is_positive(c: &[f64; 4], x: f64) -> bool {
+/// Where `wanted`: whether the coefficients on \[0, x\] are positive, or those on both halves of it.
+#[inline(always)]
+fn is_positive_until<L: Lanes>(c: &[L; 4], x: L, wanted: L::Mask) -> L::Mask {
     let [left, _] = split(c, x);
-    if left.iter().all(|&v| v > 0.0) {
-        return true;
+    let is_positive = all_positive(&left);
+    if !(wanted & !is_positive).any() {
+        return is_positive;
     }
-    split(&left, 0.5).iter().flatten().all(|&v| v > 0.0)
+    let [first, second] = split(&left, L::splat(0.5));
+    is_positive | (all_positive(&first) & all_positive(&second))
 }
 
 /// Bernstein coefficients on \[0, x\] and on \[x, 1\] (de Casteljau).
-#[inline]
-fn split(c: &[f64; 4], x: f64) -> [[f64; 4]; 2] {
-    let mix = |p: f64, q: f64| p * (1.0 - x) + q * x;
-    let (p, q, r) = (mix(c[0], c[1]), mix(c[1], c[2]), mix(c[2], c[3]));
-    let (pq, qr) = (mix(p, q), mix(q, r));
-    let pqr = mix(pq, qr);
+#[inline(always)]
+fn split<L: Lanes>(c: &[L; 4], x: L) -> [[L; 4]; 2] {
+    let (p, q, r) = (mix(c[0], c[1], x), mix(c[1], c[2], x), mix(c[2], c[3], x));
+    let (pq, qr) = (mix(p, q, x), mix(q, r, x));
+    let pqr = mix(pq, qr, x);
     [[c[0], p, pq, pqr], [pqr, qr, r, c[3]]]
 }
 
+#[inline(always)]
+fn mix<L: Lanes>(p: L, q: L, x: L) -> L {
+    p * (L::splat(1.0) - x) + q * x
+}
+
 /// Bernstein coefficients of the same polynomial on \[t, 1\].
-#[inline]
-fn restrict(b: &[f64; 4], t: f64) -> [f64; 4] {
-    if t == 0.0 { *b } else { split(b, t)[1] }
+#[inline(always)]
+fn restrict<L: Lanes>(b: &[L; 4], t: L) -> [L; 4] {
+    let is_later = t.greater(L::splat(0.0));
+    if !is_later.any() {
+        return *b;
+    }
+    let [_, mut right] = split(b, t);
+    for k in 0..4 {
+        right[k] = L::select(is_later, right[k], b[k]);
+    }
+    right
 }

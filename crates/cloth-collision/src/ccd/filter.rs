@@ -7,13 +7,12 @@
 //! Source: E. G. Gilbert, "An Iterative Procedure for Computing the Minimum of a Quadratic Form on a Convex Set", 1966.
 
 use super::ROUNDING;
+pub(crate) use super::lanes::Row;
 use super::lanes::{Lanes, Vector};
-use crate::Vec3;
+use crate::{StencilKind, Vec3};
 
-/// Directions of Gilbert's algorithm that are tried with every candidate, by measurement.
-const FEW: usize = 2;
-/// Directions that are tried with what is left then: more cost more than the exact searches that they save.
-const MANY: usize = 8;
+/// Directions of Gilbert's algorithm that are tried: more cost more than the exact searches that they save.
+pub(crate) const MANY: usize = 5;
 
 /// Directions for features at rest.
 const AT_REST: usize = 3;
@@ -31,17 +30,7 @@ pub(crate) type Points<L> = [Vector<L>; 8];
 /// infinite bound.
 #[inline(always)]
 pub(crate) fn determinant<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Vector<L>; 2]) -> ([L; 4], L) {
-    let yz0 = y[0].cross(z[0]);
-    let yz1 = y[1].cross(z[1]);
-    // Mixed part of the product: y0×z1 + y1×z0.
-    let mixed = y[0].cross(z[1]) + y[1].cross(z[0]);
-    let third = L::splat(1.0 / 3.0);
-    let b = [
-        x[0].dot(yz0),
-        (x[0].dot(mixed) + x[1].dot(yz0)) * third,
-        (x[1].dot(mixed) + x[0].dot(yz1)) * third,
-        x[1].dot(yz1),
-    ];
+    let b = coefficients(x, y, z);
     let size = x[0].largest().max(x[1].largest())
         * y[0].largest().max(y[1].largest())
         * z[0].largest().max(z[1].largest());
@@ -50,61 +39,62 @@ pub(crate) fn determinant<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Ve
     (b, error)
 }
 
-/// Where the vertex certainly stays farther than `thickness` from the triangle during the step.
+/// The Bernstein coefficients of [`determinant`].
 #[inline(always)]
-pub(crate) fn vertex_triangle_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    vertex_triangle::<L, MANY>(p, thickness)
+pub(crate) fn coefficients<L: Lanes>(x: [Vector<L>; 2], y: [Vector<L>; 2], z: [Vector<L>; 2]) -> [L; 4] {
+    let yz0 = y[0].cross(z[0]);
+    let yz1 = y[1].cross(z[1]);
+    // Mixed part of the product: y0×z1 + y1×z0.
+    let mixed = y[0].cross(z[1]) + y[1].cross(z[0]);
+    let third = L::splat(1.0 / 3.0);
+    [
+        x[0].dot(yz0),
+        (x[0].dot(mixed) + x[1].dot(yz0)) * third,
+        (x[1].dot(mixed) + x[0].dot(yz1)) * third,
+        x[1].dot(yz1),
+    ]
 }
 
-/// [`vertex_triangle_apart`] with less effort.
+/// Where the features certainly stay farther than `thickness` apart during the step, as [`MANY`] directions or the cubic
+/// show.
 #[inline(always)]
-fn vertex_triangle_maybe_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    vertex_triangle::<L, FEW>(p, thickness)
-}
-
-#[inline(always)]
-fn vertex_triangle<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
-    let d = [p[1] - p[0], p[2] - p[0], p[3] - p[0], p[5] - p[4], p[6] - p[4], p[7] - p[4]];
-    let apart = separated::<L, 6, STEPS>(&d, thickness);
-    if thickness > 0.0 {
-        return apart;
+pub(crate) fn apart<L: Lanes>(kind: StencilKind, p: &Points<L>, thickness: f64) -> L::Mask {
+    match kind {
+        StencilKind::VertexTriangle => {
+            let d = vertex_triangle_differences(p);
+            let apart = separated::<L, 6, MANY>(&d, thickness, Errors::of_doubles(&d));
+            if thickness > 0.0 {
+                return apart;
+            }
+            apart | rootless(determinant([d[0], d[3]], [d[1], d[4]], [d[2], d[5]]))
+        }
+        StencilKind::EdgeEdge => {
+            let d = edge_edge_differences(p);
+            let apart = separated::<L, 8, MANY>(&d, thickness, Errors::of_doubles(&d));
+            if thickness > 0.0 {
+                return apart;
+            }
+            apart
+                | rootless(determinant([d[0], d[4]], [p[1] - p[0], p[5] - p[4]], [p[3] - p[2], p[7] - p[6]]))
+        }
     }
-    apart | rootless(determinant([d[0], d[3]], [d[1], d[4]], [d[2], d[5]]))
 }
 
-/// Where the edges certainly stay farther than `thickness` apart during the step.
+/// The triangle's corners less the vertex, at t0 and at t1.
 #[inline(always)]
-pub(crate) fn edge_edge_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    edge_edge::<L, MANY>(p, thickness)
+pub(crate) fn vertex_triangle_differences<L: Lanes>(p: &Points<L>) -> [Vector<L>; 6] {
+    [p[1] - p[0], p[2] - p[0], p[3] - p[0], p[5] - p[4], p[6] - p[4], p[7] - p[4]]
 }
 
-/// [`edge_edge_apart`] with less effort.
+/// The ends of the first edge less those of the second, at t0 and at t1.
 #[inline(always)]
-fn edge_edge_maybe_apart<L: Lanes>(p: &Points<L>, thickness: f64) -> L::Mask {
-    edge_edge::<L, FEW>(p, thickness)
+pub(crate) fn edge_edge_differences<L: Lanes>(p: &Points<L>) -> [Vector<L>; 8] {
+    [p[0] - p[2], p[0] - p[3], p[1] - p[2], p[1] - p[3], p[4] - p[6], p[4] - p[7], p[5] - p[6], p[5] - p[7]]
 }
 
+/// Where the coefficients, known to ± the error, have one sign.
 #[inline(always)]
-fn edge_edge<L: Lanes, const STEPS: usize>(p: &Points<L>, thickness: f64) -> L::Mask {
-    let d = [
-        p[0] - p[2],
-        p[0] - p[3],
-        p[1] - p[2],
-        p[1] - p[3],
-        p[4] - p[6],
-        p[4] - p[7],
-        p[5] - p[6],
-        p[5] - p[7],
-    ];
-    let apart = separated::<L, 8, STEPS>(&d, thickness);
-    if thickness > 0.0 {
-        return apart;
-    }
-    apart | rootless(determinant([d[0], d[4]], [p[1] - p[0], p[5] - p[4]], [p[3] - p[2], p[7] - p[6]]))
-}
-
-#[inline(always)]
-fn rootless<L: Lanes>((b, error): ([L; 4], L)) -> L::Mask {
+pub(crate) fn rootless<L: Lanes>((b, error): ([L; 4], L)) -> L::Mask {
     let below = L::splat(0.0) - error;
     let lowest = b[0].min(b[1]).min(b[2]).min(b[3]);
     let highest = b[0].max(b[1]).max(b[2]).max(b[3]);
@@ -112,16 +102,36 @@ fn rootless<L: Lanes>((b, error): ([L; 4], L)) -> L::Mask {
     lowest.greater(error) | below.greater(highest)
 }
 
+/// How far n·d − thickness |n| may be off: `rounding` (|n|₁ `extent` + thickness |n|) + `least`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Errors<L> {
+    pub(crate) extent: L,
+    pub(crate) rounding: f64,
+    pub(crate) least: f64,
+}
+
+impl<L: Lanes> Errors<L> {
+    /// In double precision: with u = 2⁻⁵³, differences carry u per coordinate, the dot product 3u, |n| 4u and its product
+    /// with the thickness u: in all less than [`ROUNDING`] (|n|₁ max|d| + thickness |n|).
+    #[inline(always)]
+    fn of_doubles<const N: usize>(d: &[Vector<L>; N]) -> Self {
+        let mut extent = d[0].largest();
+        for k in 1..N {
+            extent = extent.max(d[k].largest());
+        }
+        Self { extent, rounding: ROUNDING, least: f64::MIN_POSITIVE }
+    }
+}
+
 /// Where a direction is found along which all differences lie beyond the thickness, at both ends and so in between.
-///
-/// With g = n·d and u = 2⁻⁵³: differences carry u per coordinate, the dot product 3u, |n| 4u and its product with the
-/// thickness u: in all less than [`ROUNDING`] (|n|₁ max|d| + thickness |n|).
 #[inline(always)]
-fn separated<L: Lanes, const N: usize, const STEPS: usize>(d: &[Vector<L>; N], thickness: f64) -> L::Mask {
-    let mut extent = d[0].largest();
+pub(crate) fn separated<L: Lanes, const N: usize, const STEPS: usize>(
+    d: &[Vector<L>; N],
+    thickness: f64,
+    errors: Errors<L>,
+) -> L::Mask {
     let mut sum = d[0];
     for k in 1..N {
-        extent = extent.max(d[k].largest());
         sum = sum + d[k];
     }
     let mut n = sum.scale(L::splat(1.0 / N as f64));
@@ -135,14 +145,14 @@ fn separated<L: Lanes, const N: usize, const STEPS: usize>(d: &[Vector<L>; N], t
             corner = Vector::select(lower, d[k], corner);
             lowest = L::select(lower, g, lowest);
         }
-        let mut size = n.sum_of_sizes() * extent;
-        let mut needed = L::splat(f64::MIN_POSITIVE);
+        let mut size = n.sum_of_sizes() * errors.extent;
+        let mut needed = L::splat(errors.least);
         if thickness > 0.0 {
             let offset = n.dot(n).sqrt() * L::splat(thickness);
             size = size + offset;
             needed = needed + offset;
         }
-        apart = apart | lowest.greater(needed + size * L::splat(ROUNDING));
+        apart = apart | lowest.greater(needed + size * L::splat(errors.rounding));
         if step + 1 < STEPS {
             // Nearest point to the origin on the segment from n to the corner.
             let back = n - corner;
@@ -156,17 +166,16 @@ fn separated<L: Lanes, const N: usize, const STEPS: usize>(d: &[Vector<L>; N], t
 /// Where a vertex (first point) is certainly farther than `thickness` from a triangle (last three), all at rest.
 #[inline(always)]
 fn vertex_triangle_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
-    separated::<L, 3, AT_REST>(&[p[0] - p[1], p[0] - p[2], p[0] - p[3]], thickness)
+    let d = [p[0] - p[1], p[0] - p[2], p[0] - p[3]];
+    separated::<L, 3, AT_REST>(&d, thickness, Errors::of_doubles(&d))
 }
 
 /// Where an edge (first two points) is certainly farther than `thickness` from another (last two), all at rest.
 #[inline(always)]
 fn edge_edge_beyond<L: Lanes>(p: &[Vector<L>; 4], thickness: f64) -> L::Mask {
-    separated::<L, 4, AT_REST>(&[p[0] - p[2], p[0] - p[3], p[1] - p[2], p[1] - p[3]], thickness)
+    let d = [p[0] - p[2], p[0] - p[3], p[1] - p[2], p[1] - p[3]];
+    separated::<L, 4, AT_REST>(&d, thickness, Errors::of_doubles(&d))
 }
-
-/// A point with a fourth entry of no meaning, so that it fills a register.
-pub(crate) type Row = [f64; 4];
 
 /// Copies positions into rows.
 pub(crate) fn row(x: &Vec3) -> Row {
@@ -194,6 +203,7 @@ macro_rules! four_at_once {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = "avx2")]
         fn $avx(rows: &[[&Row; $points]; 4], thickness: f64) -> u32 {
+            use super::lanes::Mask;
             use super::lanes::avx::Four;
             let mut points = [Vector([Four::splat(0.0); 3]); $points];
             for k in 0..$points {
@@ -206,15 +216,6 @@ macro_rules! four_at_once {
         }
     };
 }
-four_at_once!(
-    four_vertex_triangles_maybe_apart,
-    four_vertex_triangles_maybe_apart_avx2,
-    vertex_triangle_maybe_apart,
-    8
-);
-four_at_once!(four_edge_edges_maybe_apart, four_edge_edges_maybe_apart_avx2, edge_edge_maybe_apart, 8);
-four_at_once!(four_vertex_triangles_apart, four_vertex_triangles_apart_avx2, vertex_triangle_apart, 8);
-four_at_once!(four_edge_edges_apart, four_edge_edges_apart_avx2, edge_edge_apart, 8);
 four_at_once!(four_vertex_triangles_beyond, four_vertex_triangles_beyond_avx2, vertex_triangle_beyond, 4);
 four_at_once!(four_edge_edges_beyond, four_edge_edges_beyond_avx2, edge_edge_beyond, 4);
 
@@ -262,9 +263,4 @@ pub(crate) fn in_lanes<'a, T: Copy, R: 'a, A: Copy, const N: usize, const LANES:
     for (lane, &item) in rest.iter().enumerate() {
         each(item, answer, lane);
     }
-}
-
-/// One pair.
-pub(crate) fn points(p: &[Vec3; 8]) -> Points<f64> {
-    p.map(Vector::from)
 }

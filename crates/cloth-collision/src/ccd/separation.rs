@@ -1,41 +1,54 @@
 //! Separation of moving convex sets along a fixed direction.
 
 use super::ROUNDING;
-use crate::Vec3;
+use super::lanes::{Lanes, Mask, Vector};
 
 /// The relative motion of two convex sets: `K` differences of their corners (first − second), at t0 and at t1.
 ///
 /// At time t the sets' distance is that of the origin from the convex hull of d0 + t (d1 − d0).
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Relative<const K: usize> {
-    pub(crate) d0: [Vec3; K],
-    pub(crate) d1: [Vec3; K],
+pub(crate) struct Relative<L, const K: usize> {
+    pub(crate) d0: [Vector<L>; K],
+    pub(crate) d1: [Vector<L>; K],
     /// Largest absolute coordinate of all differences.
-    pub(crate) extent: f64,
+    pub(crate) extent: L,
     /// Distance that counts as contact, ≥ 0.
-    pub(crate) thickness: f64,
+    pub(crate) thickness: L,
+    /// Whether the thickness is more than 0 in any lane.
+    pub(crate) is_thick: bool,
 }
 
 /// Answer of [`Relative::separated_until`]: the direction separates up to and including t1.
 pub(crate) const BEYOND_END: f64 = 2.0;
 
-impl<const K: usize> Relative<K> {
-    pub(crate) fn new(d0: [Vec3; K], d1: [Vec3; K], thickness: f64) -> Self {
-        let extent = d0.iter().chain(&d1).fold(0.0f64, |extent, d| extent.max(d.amax()));
-        Self { d0, d1, extent, thickness }
+impl<L: Lanes, const K: usize> Relative<L, K> {
+    #[inline(always)]
+    pub(crate) fn new(d0: [Vector<L>; K], d1: [Vector<L>; K], thickness: f64) -> Self {
+        let mut extent = L::splat(0.0);
+        for k in 0..K {
+            extent = d0[k].largest().max(d1[k].largest()).max(extent);
+        }
+        Self { d0, d1, extent, thickness: L::splat(thickness), is_thick: thickness > 0.0 }
     }
 
     /// Multiplies all lengths by a power of two.
-    pub(crate) fn scale(&mut self, factor: f64) {
-        for vector in self.d0.iter_mut().chain(&mut self.d1) {
-            *vector *= factor;
+    #[inline(always)]
+    pub(crate) fn scale(&mut self, factor: L) {
+        for k in 0..K {
+            self.d0[k] = self.d0[k].scale(factor);
+            self.d1[k] = self.d1[k].scale(factor);
         }
-        self.extent *= factor;
-        self.thickness *= factor;
+        self.extent = self.extent * factor;
+        self.thickness = self.thickness * factor;
     }
 
-    pub(crate) fn at(&self, t: f64) -> [Vec3; K] {
-        std::array::from_fn(|k| self.d0[k] * (1.0 - t) + self.d1[k] * t)
+    #[inline(always)]
+    pub(crate) fn at(&self, t: L) -> [Vector<L>; K] {
+        let mut d = self.d0;
+        for k in 0..K {
+            d[k] = d[k].mix(self.d1[k], t);
+        }
+        d
     }
 
     /// A time t' such that all differences lie farther than the thickness on the positive side of the direction `n`
@@ -47,38 +60,44 @@ impl<const K: usize> Relative<K> {
     /// thickness u more, the difference u: 6uG; interpolation to t 3uG; the crossing (g0−E)/(g0−g1) 4uG. Their sum
     /// is less than 17uG; E = [`ROUNDING`] G leaves room for the higher orders and, with the extent scaled to 1,
     /// for underflow.
-    #[inline]
-    pub(crate) fn separated_until(&self, n: &Vec3, t: f64) -> f64 {
-        let offset = if self.thickness > 0.0 { self.thickness * n.norm() } else { 0.0 };
+    #[inline(always)]
+    pub(crate) fn separated_until(&self, n: Vector<L>, t: L) -> L {
+        let zero = L::splat(0.0);
+        let offset = if self.is_thick { self.thickness * n.norm_squared().sqrt() } else { zero };
         let bound =
-            ROUNDING * ((n.x.abs() + n.y.abs() + n.z.abs()) * self.extent + offset) + f64::MIN_POSITIVE;
-        let mut until = BEYOND_END;
+            L::splat(ROUNDING) * (n.sum_of_sizes() * self.extent + offset) + L::splat(f64::MIN_POSITIVE);
+        let twice = L::splat(2.0) * bound;
+        let mut until = L::splat(BEYOND_END);
+        let mut is_apart = !zero.greater(zero);
         for k in 0..K {
-            let (g0, g1) = (n.dot(&self.d0[k]) - offset, n.dot(&self.d1[k]) - offset);
-            let now = g0 * (1.0 - t) + g1 * t;
-            // Written so that a NaN counts as "not separated".
-            if !(now > 2.0 * bound) {
-                return t;
-            }
-            if !(g1 > bound) {
-                until = until.min((g0 - bound) / (g0 - g1));
+            let (g0, g1) = (n.dot(self.d0[k]) - offset, n.dot(self.d1[k]) - offset);
+            let now = g0 * (L::splat(1.0) - t) + g1 * t;
+            is_apart = is_apart & now.greater(twice);
+            let falls = !g1.greater(bound);
+            if falls.any() {
+                until = L::select(falls, ((g0 - bound) / (g0 - g1)).min(until), until);
             }
         }
-        until.max(t)
+        L::select(is_apart, until.max(t), t)
     }
 
-    /// Whether a coordinate axis separates the sets during the whole step.
+    /// Where a coordinate axis separates the sets during the whole step.
     ///
     /// Along an axis the only error is that of the differences, which is relative: their signs are exact, and this
     /// decides pairs that the error bounds of other directions cannot. The thickness is widened by two roundings.
-    #[inline]
-    pub(crate) fn separated_by_axis(&self) -> bool {
-        let threshold = self.thickness * (1.0 + 4.0 * f64::EPSILON);
-        (0..3).any(|axis| {
-            let above = |d: &Vec3| d[axis] > threshold;
-            let below = |d: &Vec3| d[axis] < -threshold;
-            (self.d0.iter().all(above) && self.d1.iter().all(above))
-                || (self.d0.iter().all(below) && self.d1.iter().all(below))
-        })
+    #[inline(always)]
+    pub(crate) fn separated_by_axis(&self) -> L::Mask {
+        let threshold = self.thickness * L::splat(1.0 + 4.0 * f64::EPSILON);
+        let below = L::splat(0.0) - threshold;
+        let mut is_apart = threshold.greater(threshold);
+        for axis in 0..3 {
+            let (mut lo, mut hi) = (self.d0[0].0[axis], self.d0[0].0[axis]);
+            for k in 0..K {
+                lo = self.d0[k].0[axis].min(self.d1[k].0[axis]).min(lo);
+                hi = self.d0[k].0[axis].max(self.d1[k].0[axis]).max(hi);
+            }
+            is_apart = is_apart | lo.greater(threshold) | below.greater(hi);
+        }
+        is_apart
     }
 }

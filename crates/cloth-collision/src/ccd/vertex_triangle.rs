@@ -1,63 +1,65 @@
 //! The vertex-triangle stencil: its relative motion, its cubic and the directions that may separate it.
 
 use super::cubic::Cubic;
+use super::filter::Points;
+use super::lanes::{Lanes, Vector};
+use super::march::{Directions, Motion};
 use super::separation::Relative;
-use super::{INSIDE_MARGIN, Motion, TOUCHING};
-use crate::Vec3;
-use crate::distance::vertex_triangle::closest_point;
+use super::{INSIDE_MARGIN, TOUCHING};
+use crate::distance::vertex_triangle::weights;
 
 /// The triangle's corners relative to the vertex.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct VertexTriangleMotion(pub(crate) Relative<3>);
+pub(crate) struct VertexTriangleMotion<L>(Relative<L, 3>);
 
-impl VertexTriangleMotion {
-    pub(crate) fn new(p: &[Vec3; 8], thickness: f64) -> Self {
+impl<L: Lanes> Motion<L, 3> for VertexTriangleMotion<L> {
+    #[inline(always)]
+    fn new(p: &Points<L>, thickness: f64) -> Self {
         Self(Relative::new(
             [p[1] - p[0], p[2] - p[0], p[3] - p[0]],
             [p[5] - p[4], p[6] - p[4], p[7] - p[4]],
             thickness,
         ))
     }
-}
 
-impl Motion<3> for VertexTriangleMotion {
-    fn relative(&self) -> &Relative<3> {
+    #[inline(always)]
+    fn relative(&self) -> &Relative<L, 3> {
         &self.0
     }
 
-    fn scale(&mut self, factor: f64) {
+    #[inline(always)]
+    fn scale(&mut self, factor: L) {
         self.0.scale(factor);
     }
 
-    fn cubic(&self) -> Cubic {
+    #[inline(always)]
+    fn cubic(&self) -> Cubic<L> {
         let Relative { d0, d1, .. } = &self.0;
-        let [a, b, c] = [0, 1, 2].map(|k| [d0[k], d1[k]]);
-        Cubic::determinant(&a, &b, &c)
+        Cubic::determinant([d0[0], d1[0]], [d0[1], d1[1]], [d0[2], d1[2]])
     }
 
-    fn is_inside(&self, t: f64) -> bool {
+    #[inline(always)]
+    fn is_inside(&self, t: L) -> L::Mask {
         let [a, b, c] = self.0.at(t);
-        let n = (b - a).cross(&(c - a));
-        if n.dot(&a).abs() > TOUCHING * n.norm() {
-            return false;
-        }
-        let w = [b.cross(&c).dot(&n), c.cross(&a).dot(&n), a.cross(&b).dot(&n)];
-        let margin = INSIDE_MARGIN * (w[0] + w[1] + w[2]);
-        w.iter().all(|&w| w > margin)
+        let n = (b - a).cross(c - a);
+        let is_near = !n.dot(a).abs().greater(L::splat(TOUCHING) * n.norm_squared().sqrt());
+        let w = [b.cross(c).dot(n), c.cross(a).dot(n), a.cross(b).dot(n)];
+        let margin = L::splat(INSIDE_MARGIN) * (w[0] + w[1] + w[2]);
+        is_near & w[0].greater(margin) & w[1].greater(margin) & w[2].greater(margin)
     }
 
-    #[inline]
-    fn directions(&self, t: f64, mut visit: impl FnMut(Vec3) -> bool) {
+    #[inline(always)]
+    fn directions(&self, t: L, visit: &mut impl Directions<L>) {
+        let zero = L::splat(0.0);
         let [a, b, c] = self.0.at(t);
-        let w = closest_point(&[Vec3::zeros(), a, b, c]);
-        if visit(a * w[0] + b * w[1] + c * w[2]) {
+        let w = weights([Vector([zero; 3]), a, b, c]);
+        if visit.is_content(a.scale(w[0]) + b.scale(w[1]) + c.scale(w[2])) {
             return;
         }
-        let n = (b - a).cross(&(c - a));
+        let n = (b - a).cross(c - a);
         // Across the plane; in the plane, from each side inwards.
-        let _ = visit(if n.dot(&a) > 0.0 { n } else { -n })
-            || visit(n.cross(&(b - a)))
-            || visit(n.cross(&(c - b)))
-            || visit(n.cross(&(a - c)));
+        let _ = visit.is_content(Vector::select(n.dot(a).greater(zero), n, n.negated()))
+            || visit.is_content(n.cross(b - a))
+            || visit.is_content(n.cross(c - b))
+            || visit.is_content(n.cross(a - c));
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::Vec3;
 use crate::bounds::middle;
-use crate::ccd::lanes::{Lanes, Vector};
+use crate::ccd::lanes::{Lanes, Mask, Vector};
 
 /// Bound of the error of a difference of two heights along n, per |n|₁.
 ///
@@ -255,7 +255,7 @@ macro_rules! eight_at_once {
         eight_at_once!(
             $(#[$doc])* $name, $avx, $one, $points, u32,
             |bits: &mut u32, lane: usize, apart| *bits |= u32::from(apart) << lane,
-            crate::ccd::lanes::avx::EightMask::bits
+            Mask::bits
         );
     };
 }

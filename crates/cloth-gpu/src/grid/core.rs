@@ -145,7 +145,9 @@ impl Registrar for Grid {
             }
         }
         self.cells.grow(gpu, room as u32, self.registrations)?;
-        self.key_bits = self.key_bits.max(key_bits(words));
+        // A bit more, as scenes move; no fewer passes than that needs.
+        let bits = key_bits(words);
+        self.key_bits = if bits > self.key_bits { bits + 1 } else { self.key_bits.min(bits + 1) };
         Ok(!fits)
     }
 

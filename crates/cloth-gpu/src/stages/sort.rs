@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 /// Keys of 32 or 64 bits with a 32-bit value each, sorted in place on the device.
 ///
-/// Three dispatches and a scan per digit of 4 bits: count, scan, scatter. No workgroup waits for another one. Passes come in
-/// pairs, so that the result lies where the input was.
+/// Three dispatches and a scan per digit of 4 bits: count, scan, scatter. No workgroup waits for another one. After an odd number of
+/// passes the result is copied back to where the input was.
 #[derive(Debug)]
 pub struct Sort {
     count: Arc<Kernel>,
@@ -39,9 +39,9 @@ pub fn sources(subgroups: bool, high: bool) -> [Source; 2] {
     ]
 }
 
-/// Passes that sort by the lowest `bits` bits: even.
-fn passes(bits: u32) -> u32 {
-    bits.div_ceil(2 * DIGIT_BITS) * 2
+/// Passes that sort by the lowest `bits` bits.
+pub(crate) fn passes(bits: u32) -> u32 {
+    bits.div_ceil(DIGIT_BITS)
 }
 
 impl Sort {
@@ -137,7 +137,6 @@ impl Sort {
             let (from, to) = if pass % 2 == 0 { (here, there) } else { (there, here) };
             let shift = pass * DIGIT_BITS;
             let word = if shift < 32 { from.0 } else { from.2.unwrap_or(from.0) };
-            // Beyond the last bit there is nothing to sort by: the pass only moves the entries back.
             let count_shift = shift % 32;
             let params = LengthParams { most: n.most, word: n.index(), shift: count_shift, extra: blocks };
             recorder.dispatch(&self.count, &params, &[lengths, word, &self.counts.raw], blocks);
@@ -149,6 +148,13 @@ impl Sort {
                 recorder.dispatch(&self.scatter_high, &params, &arrays, blocks);
             } else {
                 recorder.dispatch(&self.scatter, &params, &arrays, blocks);
+            }
+        }
+        if passes(bits) % 2 == 1 {
+            for (from, to) in self.other.iter().zip([Some(keys), Some(values), high]) {
+                if let Some(to) = to {
+                    recorder.copy(from, to, most);
+                }
             }
         }
         Ok(())

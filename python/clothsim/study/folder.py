@@ -1,0 +1,87 @@
+"""The folder of a study: what it may hold, and the work folder that makes it resumable.
+
+``OUT/.clothsim`` holds a result for every run so far, named for a fingerprint of all that the run depends on, and the
+study they belong to. It is removed when the tables and plots are written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from clothsim._files import write_whole
+from clothsim._run.folder import RunFolder
+from clothsim.errors import CheckpointError, OutputExists
+
+__all__ = ["OUTPUTS", "StudyFolder", "fingerprint"]
+
+OUTPUTS = ("study.json", "study.csv", "study.md", "study.png", "study.svg")
+_STUDY = "study"
+
+
+def fingerprint(facts: Any, extra: bytes = b"") -> str:
+    """Digest of anything that JSON holds, and of bytes."""
+    text = json.dumps(facts, sort_keys=True, default=str).encode()
+    return hashlib.sha256(text + b"\0" + extra).hexdigest()[:24]
+
+
+class StudyFolder(RunFolder):
+    """``OUT`` and its work folder."""
+
+    def present(self) -> list[str]:
+        """Outputs that are there."""
+        return [name for name in (*OUTPUTS, "tuned.toml", "tune.json") if (self.out / name).exists()]
+
+    def begin(self, digest: str, *, resume: bool, overwrite: bool) -> dict[str, Any] | None:
+        """Refuse a folder in use; return the facts of the same study if it is complete and to be resumed.
+
+        Raises
+        ------
+        OutputExists
+            The folder holds a study, or a run, and neither ``resume`` nor ``overwrite`` is set.
+        CheckpointError
+            What is to be resumed is another study.
+        """
+        if self.out.exists() and not self.out.is_dir():
+            raise OutputExists(f"{self.out}: expected a folder, got a file")
+        runs = RunFolder(self.out).present()
+        if runs or (self.started and not self._digest_file.exists() and any(self.work.glob("*"))):
+            raise OutputExists(f"{self.out}: holds a run of a scene; choose another folder")
+        if overwrite:
+            return None
+        if self.started and self._digest_file.exists():
+            if not resume:
+                raise OutputExists(
+                    f"{self.out}: holds an unfinished study; --resume goes on with it, --overwrite starts anew"
+                )
+            if self._digest_file.read_text() != digest:
+                raise CheckpointError(f"{self.out}: the unfinished study is another one; --overwrite starts anew")
+            return None
+        present = self.present()
+        if present and not resume:
+            raise OutputExists(f"{self.out}: holds a study already ({', '.join(present)}); --overwrite replaces it")
+        return self._complete(digest) if present else None
+
+    def _complete(self, digest: str) -> dict[str, Any]:
+        try:
+            facts = json.loads((self.out / "study.json").read_bytes())
+            same = facts["digest"] == digest
+        except (OSError, ValueError, KeyError, TypeError):
+            same = False
+        if not same:
+            raise CheckpointError(f"{self.out}: the finished study is another one; --overwrite starts anew")
+        return dict(facts)
+
+    @property
+    def _digest_file(self) -> Path:
+        return self.work / _STUDY
+
+    def claim(self, digest: str, *, overwrite: bool) -> None:
+        """Say whose the work folder is, with the folder locked; forget the results of another study."""
+        if overwrite or (self._digest_file.exists() and self._digest_file.read_text() != digest):
+            for path in self.work.iterdir():
+                if path.name != "lock":
+                    path.unlink()
+        write_whole(self._digest_file, digest.encode())
