@@ -44,5 +44,5 @@ def checks(measured: Parts) -> Sequence[Check]:
 
 def draw(measured: Parts) -> bytes:
     """The shares beside the thesis's."""
-    words = "Continuous detection on a GPU; narrow phase on the CPU."
+    words = "Continuous detection on a GPU; the CPU decides what its filter leaves."
     return draw_parts(measured, PRINTED, "Figure 5.15: steps of virtual subdivision", words)
