@@ -318,7 +318,7 @@ fn planted_faults_are_caught() {
         ("bottom-up", |r| r.kinds[start(2, 1)] ^= 1),
         ("top-down", |r| r.leaves[3] ^= 1),
         ("registrations", |r| r.keys[50] ^= 2),
-        ("registrations", |r| r.registered.swap(0, 1)),
+        ("registrations", |r| r.registered.rotate_left(1)),
         ("entries", |r| r.entries[20].control ^= 1),
         ("tally", |r| r.tally[3] += 1),
         ("tests", |r| r.tests += 1),

@@ -42,8 +42,6 @@ use std::sync::Arc;
 
 /// Most workgroups that share the pages.
 const PAGE_GROUPS: u32 = 2048;
-/// A root's side is at least the longest one over this: cells much flatter than triangles would hold each triangle many times.
-const FLATTEST: f32 = 8.0;
 
 /// The octree of a scene and the registrations in its leaves, sorted by leaf.
 #[derive(Debug)]
@@ -153,11 +151,12 @@ pub fn params(
     is_two_stage: bool,
 ) -> OctreeParams {
     let extents = [0, 1, 2].map(|k| scene.high[k] - scene.low[k] + 2.0 * reach);
-    let least = extents.iter().fold(0.0f32, |a, &b| a.max(b)) / FLATTEST;
+    // The root is a cube: cells flatter than the triangles would hold each of them many times.
+    let side = extents.iter().fold(0.0f32, |a, &b| a.max(b));
     OctreeParams {
         low: scene.low.map(|x| x - reach),
         triangles: scene.triangles,
-        inverse: extents.map(|extent| (1u32 << levels.base) as f32 / extent.max(least)),
+        inverse: [(1u32 << levels.base) as f32 / side; 3],
         base: levels.base,
         top: levels.top,
         page: page_level(levels.base),
