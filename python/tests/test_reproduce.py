@@ -165,6 +165,20 @@ def test_a_folder_with_a_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     assert "holds a run of a scene" in capsys.readouterr().err
 
 
+def test_what_was_killed_can_be_made_again(tmp_path: Path) -> None:
+    (tmp_path / ".clothsim").mkdir()
+    (tmp_path / ".clothsim" / "lock").touch()  # what kill -9 leaves
+    assert main(["reproduce", "4.7", "-o", str(tmp_path), "--quick", "--quiet"]) == 0
+    assert not (tmp_path / ".clothsim").exists()
+
+
+def test_a_folder_with_an_unfinished_run_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / ".clothsim").mkdir()
+    (tmp_path / ".clothsim" / "frames.bin").touch()
+    assert main(["reproduce", "4.7", "-o", str(tmp_path), "--quick", "--overwrite"]) == 2
+    assert "holds a run of a scene" in capsys.readouterr().err
+
+
 def test_a_failure_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: Any, **__: Any) -> None:
         raise InvalidInput("planted")
@@ -271,7 +285,8 @@ def test_where_one_simulation_fails_the_others_end() -> None:
     assert done == []
 
 
-def test_ctrl_c_ends_soon_and_leaves_no_folder(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_ends_soon_and_leaves_no_folder(tmp_path: Path, number: signal.Signals) -> None:
     out = tmp_path / "out"
     process = subprocess.Popen(cli_command("reproduce", "4.13", "-o", out, "--quiet"), stderr=subprocess.PIPE)
     deadline = time.monotonic() + 60
@@ -279,7 +294,7 @@ def test_ctrl_c_ends_soon_and_leaves_no_folder(tmp_path: Path) -> None:
         assert time.monotonic() < deadline
         time.sleep(0.01)
     time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, error = process.communicate(timeout=30)
     assert process.returncode == 130
     assert error.decode() == "clothsim: interrupted\n"

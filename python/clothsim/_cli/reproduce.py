@@ -56,8 +56,9 @@ def execute(options: argparse.Namespace) -> int:
         **({} if threads is None else {"threads": threads}),
     )
     with contextlib.suppress(ValueError):  # not the main thread: signals go elsewhere
-        # Ctrl-C counts even where the shell has started this in the background, with the signal ignored.
+        # Both leave nothing behind; Ctrl-C also where the shell has started this in the background, ignoring it.
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     outcome = reproduce(entry.name, options.out, effort, overwrite=options.overwrite)
     print(json.dumps(outcome.facts()) if options.json else _text(outcome))
     return 0 if outcome.passed else 1

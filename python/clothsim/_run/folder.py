@@ -64,6 +64,11 @@ class RunFolder:
         """A run was begun here and is not finished."""
         return self.work.exists()
 
+    @property
+    def holds_work(self) -> bool:
+        """More than the lock of something that was killed is there."""
+        return any(path.name != "lock" for path in self.work.glob("*"))
+
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
         """Hold the folder for this process; the lock goes with it, however it ends."""

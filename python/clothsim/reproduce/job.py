@@ -134,7 +134,7 @@ def _folder(out: Path, entry: Entry, *, overwrite: bool) -> Iterator[Path]:
     if out.exists() and not out.is_dir():
         raise OutputExists(f"{out}: expected a folder, got a file")
     run = RunFolder(out)
-    if run.started or run.present():
+    if run.holds_work or run.present():
         raise OutputExists(f"{out}: holds a run of a scene; choose another folder")
     present = sorted(path.name for path in out.glob(f"{entry.stem}[.-]*")) if out.exists() else []
     if present and not overwrite:

@@ -47,7 +47,7 @@ class StudyFolder(RunFolder):
         if self.out.exists() and not self.out.is_dir():
             raise OutputExists(f"{self.out}: expected a folder, got a file")
         runs = RunFolder(self.out).present()
-        if runs or (self.started and not self._digest_file.exists() and any(self.work.glob("*"))):
+        if runs or (self.holds_work and not self._digest_file.exists()):
             raise OutputExists(f"{self.out}: holds a run of a scene; choose another folder")
         if overwrite:
             return None
