@@ -29,6 +29,7 @@ mod portions;
 mod recorder;
 mod seconds;
 mod tail;
+mod topology;
 
 pub use adapters::{Adapter, AdapterChoice, adapters};
 pub use buffers::{Array, Length};

@@ -14,6 +14,7 @@ use crate::stages::bounds::Scene;
 use crate::stages::cells::{Cells, key_bits};
 use crate::stages::pairs::Entries;
 use crate::stages::subdivision::{Subdivision, params};
+use crate::topology::OnDevice;
 use std::sync::Arc;
 
 /// Most parts: then the cells are made larger.
@@ -39,8 +40,10 @@ struct Grid {
     parts: u64,
 }
 
-impl Core {
-    pub(super) fn new(gpu: Arc<Gpu>, mesh: &CollisionMesh, options: &GridOptions) -> Result<Self, GpuError> {
+impl OnDevice for Core {
+    type Options = GridOptions;
+
+    fn new(gpu: Arc<Gpu>, mesh: &CollisionMesh, options: &GridOptions) -> Result<Self, GpuError> {
         let n = mesh.triangles.len();
         let (mut parts, mut subdivision) = (n, None);
         if options.subdivision.is_some() {
@@ -73,12 +76,12 @@ impl Core {
         })
     }
 
-    pub(super) fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         let subdivision = self.grid.subdivision.as_ref().map_or(0, Subdivision::bytes);
         self.portions.bytes() + subdivision + self.grid.cells.bytes()
     }
 
-    pub(super) fn run(
+    fn run(
         &mut self,
         mesh: &CollisionMesh,
         query: &Query<'_>,

@@ -3,11 +3,10 @@
 
 mod core;
 
-use crate::chunks;
 use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, Query};
 use crate::context::Gpu;
 use crate::error::GpuError;
-use crate::layout::Entry;
+use crate::topology::Topology;
 use core::Core;
 use std::sync::Arc;
 
@@ -75,23 +74,14 @@ impl Default for GridOptions {
 const LAMBDA: f32 = 1.2;
 /// Least and most λ: beyond, cells hold nothing or everything.
 const LAMBDAS: [f32; 2] = [0.1, 100.0];
-/// Registrations per triangle that a chunk has room for.
-const PER_TRIANGLE: usize = 4;
-
 /// Detects contacts with a uniform grid on the device; [`Detector::name`] is `"grid"` or `"virtual-subdivision"`.
 ///
 /// The device finds candidates; [`crate::collision::NarrowPhase`] decides them. What overflows is grown and done again; what is too
 /// much for one portion is taken in several, which are decided as they come and not kept; a scene that is too large for the
-/// device's bindings is taken in chunks ([`chunks`]).
+/// device's bindings is taken in chunks ([`crate::chunks`]).
 #[derive(Debug)]
 pub struct GridGpu {
-    gpu: Arc<Gpu>,
-    options: GridOptions,
-    vertex_count: usize,
-    triangle_count: usize,
-    max_triangles: usize,
-    /// None: in chunks.
-    whole: Option<Core>,
+    topology: Topology<Core>,
     registrations: u64,
     parts: u64,
 }
@@ -127,26 +117,8 @@ impl GridGpu {
                 got: lambda.into(),
             }));
         }
-        let bound = gpu.max_binding as usize / (PER_TRIANGLE * size_of::<Entry>());
-        let max_triangles = options.max_triangles.map_or(bound, |m| m as usize).max(1);
-        let whole = if mesh.triangles.len() > max_triangles {
-            None
-        } else {
-            match Core::new(gpu.clone(), mesh, &options) {
-                Err(error) if chunks::would_help(&error) => None,
-                core => Some(core?),
-            }
-        };
-        Ok(Self {
-            options,
-            vertex_count: mesh.vertex_count,
-            triangle_count: mesh.triangles.len(),
-            max_triangles,
-            whole,
-            registrations: 0,
-            parts: 0,
-            gpu,
-        })
+        let topology = Topology::new(gpu, mesh, options, options.max_triangles)?;
+        Ok(Self { topology, registrations: 0, parts: 0 })
     }
 
     /// Registrations of triangles in cells in the last call.
@@ -161,31 +133,13 @@ impl GridGpu {
 
     /// Memory on the device, scratch memory of sorts and scans not counted [B]; 0 where the scene goes in chunks, which keep none.
     pub fn bytes(&self) -> u64 {
-        self.whole.as_ref().map_or(0, Core::bytes)
-    }
-
-    fn run(
-        &mut self,
-        mesh: &CollisionMesh,
-        query: &Query<'_>,
-        pool: &rayon::ThreadPool,
-    ) -> Result<Contacts, GpuError> {
-        if let Some(whole) = &mut self.whole {
-            match whole.run(mesh, query, pool) {
-                Err(error) if chunks::would_help(&error) => self.whole = None,
-                answer => return answer,
-            }
-        }
-        let (gpu, options) = (&self.gpu, &self.options);
-        chunks::detect(mesh, query, self.max_triangles, |mesh, query| {
-            Core::new(gpu.clone(), mesh, options)?.run(mesh, query, pool)
-        })
+        self.topology.bytes()
     }
 }
 
 impl Detector for GridGpu {
     fn name(&self) -> &'static str {
-        if self.options.subdivision.is_some() { "virtual-subdivision" } else { "grid" }
+        if self.topology.options().subdivision.is_some() { "virtual-subdivision" } else { "grid" }
     }
 
     fn detect(
@@ -194,18 +148,7 @@ impl Detector for GridGpu {
         query: &Query<'_>,
         pool: &rayon::ThreadPool,
     ) -> Result<Contacts, DetectError> {
-        query.check(mesh)?;
-        if mesh.triangles.len() != self.triangle_count || mesh.vertex_count != self.vertex_count {
-            return Err(DetectError::OtherMesh { expected: self.triangle_count, got: mesh.triangles.len() });
-        }
-        if mesh.triangles.is_empty() {
-            return Ok(Contacts::default());
-        }
-        let detector = self.name();
-        let contacts = self.run(mesh, query, pool).map_err(|error| match error {
-            GpuError::Query(error) => error,
-            error => DetectError::Device { detector, reason: error.to_string() },
-        })?;
+        let contacts = self.topology.detect(self.name(), mesh, query, pool)?;
         self.registrations = contacts.stats.count("registrations");
         self.parts = contacts.stats.count("parts");
         Ok(contacts)

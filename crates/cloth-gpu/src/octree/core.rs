@@ -13,6 +13,7 @@ use crate::stages::octree::{
     Levels, Octree, Thresholds, finest, most_registrations, next_levels, page_level,
 };
 use crate::stages::pairs::Entries;
+use crate::topology::OnDevice;
 use std::sync::Arc;
 
 /// Most visits and most registrations: then the tree loses a level.
@@ -45,11 +46,21 @@ struct Tree {
 }
 
 impl Core {
-    pub(super) fn new(
-        gpu: Arc<Gpu>,
-        mesh: &CollisionMesh,
-        options: &OctreeOptions,
-    ) -> Result<Self, GpuError> {
+    /// Levels of the next tree.
+    pub(super) fn levels(&self) -> Levels {
+        self.tree.levels
+    }
+
+    /// Registrations per level, as the last tree had them.
+    pub(super) fn per_level(&self) -> &[u32] {
+        &self.tree.tally[..TALLY_LENGTH as usize - 1]
+    }
+}
+
+impl OnDevice for Core {
+    type Options = OctreeOptions;
+
+    fn new(gpu: Arc<Gpu>, mesh: &CollisionMesh, options: &OctreeOptions) -> Result<Self, GpuError> {
         let n = mesh.triangles.len();
         let most = options.max_registrations.map_or(MAX_REGISTRATIONS, |m| m as usize);
         let max_registrations = most_registrations(&gpu).min(most);
@@ -79,21 +90,11 @@ impl Core {
         })
     }
 
-    /// Levels of the next tree.
-    pub(super) fn levels(&self) -> Levels {
-        self.tree.levels
-    }
-
-    /// Registrations per level, as the last tree had them.
-    pub(super) fn per_level(&self) -> &[u32] {
-        &self.tree.tally[..TALLY_LENGTH as usize - 1]
-    }
-
-    pub(super) fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         self.portions.bytes() + self.tree.octree.bytes()
     }
 
-    pub(super) fn run(
+    fn run(
         &mut self,
         mesh: &CollisionMesh,
         query: &Query<'_>,

@@ -2,13 +2,12 @@
 
 mod core;
 
-use crate::chunks;
 use crate::collision::{CollisionMesh, Contacts, DetectError, Detector, Query};
 use crate::context::Gpu;
 use crate::error::GpuError;
-use crate::layout::Entry;
 use crate::limits::MAX_LEVELS;
 pub use crate::stages::octree::{Levels, Thresholds};
+use crate::topology::Topology;
 use core::Core;
 use std::sync::Arc;
 
@@ -49,23 +48,14 @@ impl Default for OctreeOptions {
     }
 }
 
-/// Registrations per triangle that a chunk has room for.
-const PER_TRIANGLE: usize = 4;
-
 /// Detects contacts with an octree on the device; [`Detector::name`] is `"octree"` or `"octree-single"`.
 ///
 /// The device finds candidates; [`crate::collision::NarrowPhase`] decides them. What overflows is grown and done again; what is too
 /// much for one portion is taken in several; a scene that is too large for the device's bindings is taken in chunks
-/// ([`chunks`]), whose levels do not adapt.
+/// ([`crate::chunks`]), whose levels do not adapt.
 #[derive(Debug)]
 pub struct OctreeGpu {
-    gpu: Arc<Gpu>,
-    options: OctreeOptions,
-    vertex_count: usize,
-    triangle_count: usize,
-    max_triangles: usize,
-    /// None: in chunks.
-    whole: Option<Core>,
+    topology: Topology<Core>,
     counted: Vec<(&'static str, u64)>,
 }
 
@@ -102,35 +92,18 @@ impl OctreeGpu {
                 got: levels.into(),
             }));
         }
-        let bound = gpu.max_binding as usize / (PER_TRIANGLE * size_of::<Entry>());
-        let max_triangles = options.max_triangles.map_or(bound, |m| m as usize).max(1);
-        let whole = if mesh.triangles.len() > max_triangles {
-            None
-        } else {
-            match Core::new(gpu.clone(), mesh, &options) {
-                Err(error) if chunks::would_help(&error) => None,
-                core => Some(core?),
-            }
-        };
-        Ok(Self {
-            options,
-            vertex_count: mesh.vertex_count,
-            triangle_count: mesh.triangles.len(),
-            max_triangles,
-            whole,
-            counted: vec![],
-            gpu,
-        })
+        let topology = Topology::new(gpu, mesh, options, options.max_triangles)?;
+        Ok(Self { topology, counted: vec![] })
     }
 
     /// Levels of the next call's tree; None where the scene goes in chunks.
     pub fn levels(&self) -> Option<Levels> {
-        self.whole.as_ref().map(Core::levels)
+        self.topology.whole().map(Core::levels)
     }
 
     /// Registrations per level in the last call; none where the scene goes in chunks.
     pub fn per_level(&self) -> &[u32] {
-        self.whole.as_ref().map_or(&[], Core::per_level)
+        self.topology.whole().map_or(&[], Core::per_level)
     }
 
     /// What the last call counted, by name: registrations, leaves that hold triangles, coarsest and finest level of the tree; in chunks,
@@ -141,34 +114,13 @@ impl OctreeGpu {
 
     /// Memory on the device, scratch memory of sorts and scans not counted [B]; 0 where the scene goes in chunks, which keep none.
     pub fn bytes(&self) -> u64 {
-        self.whole.as_ref().map_or(0, Core::bytes)
-    }
-
-    fn run(
-        &mut self,
-        mesh: &CollisionMesh,
-        query: &Query<'_>,
-        pool: &rayon::ThreadPool,
-    ) -> Result<Contacts, GpuError> {
-        if let Some(whole) = &mut self.whole {
-            match whole.run(mesh, query, pool) {
-                Err(error) if chunks::would_help(&error) => self.whole = None,
-                answer => return answer,
-            }
-        }
-        let (gpu, options) = (&self.gpu, &self.options);
-        let mut out = chunks::detect(mesh, query, self.max_triangles, |mesh, query| {
-            Core::new(gpu.clone(), mesh, options)?.run(mesh, query, pool)
-        })?;
-        // Every chunk has its own levels.
-        out.stats.counts.retain(|c| !["coarsest_level", "finest_level"].contains(&c.0));
-        Ok(out)
+        self.topology.bytes()
     }
 }
 
 impl Detector for OctreeGpu {
     fn name(&self) -> &'static str {
-        if self.options.two_stage { "octree" } else { "octree-single" }
+        if self.topology.options().two_stage { "octree" } else { "octree-single" }
     }
 
     fn detect(
@@ -177,18 +129,11 @@ impl Detector for OctreeGpu {
         query: &Query<'_>,
         pool: &rayon::ThreadPool,
     ) -> Result<Contacts, DetectError> {
-        query.check(mesh)?;
-        if mesh.triangles.len() != self.triangle_count || mesh.vertex_count != self.vertex_count {
-            return Err(DetectError::OtherMesh { expected: self.triangle_count, got: mesh.triangles.len() });
+        let mut contacts = self.topology.detect(self.name(), mesh, query, pool)?;
+        if self.topology.whole().is_none() {
+            // Every chunk has its own levels.
+            contacts.stats.counts.retain(|c| !["coarsest_level", "finest_level"].contains(&c.0));
         }
-        if mesh.triangles.is_empty() {
-            return Ok(Contacts::default());
-        }
-        let detector = self.name();
-        let contacts = self.run(mesh, query, pool).map_err(|error| match error {
-            GpuError::Query(error) => error,
-            error => DetectError::Device { detector, reason: error.to_string() },
-        })?;
         let known = ["registrations", "leaves", "coarsest_level", "finest_level"];
         self.counted = contacts.stats.counts.iter().copied().filter(|c| known.contains(&c.0)).collect();
         Ok(contacts)
