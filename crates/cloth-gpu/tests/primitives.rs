@@ -146,7 +146,6 @@ fn compaction_matches_twin() {
 }
 
 #[test]
-#[ignore = "slow on a software adapter: run with --ignored"]
 fn ten_million_elements_agree() {
     let Some(device) = device(GpuOptions::default()) else { return };
     let (n, mut random) = (10_000_000, Random(4));

@@ -244,7 +244,6 @@ fn stages_match_their_twins_over_bodies() {
 }
 
 #[test]
-#[ignore = "slow on a software adapter: run with --ignored"]
 fn many_triangles_match_their_twins() {
     let Some(device) = device(variants()[0]) else { return };
     let (mesh, x_t0, x_t1) = scene(100_003, &mut Random(3));
