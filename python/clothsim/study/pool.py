@@ -96,7 +96,11 @@ def run_jobs(jobs: Sequence[Job], processes: int | None, limit: float | None, pr
                     break
                 own, free = free[:threads], free[threads:]
                 job = waiting.pop(0)
-                running.append((job, _start(job, own), own, time.monotonic()))
+                try:
+                    running.append((job, _start(job, own), own, time.monotonic()))
+                except BaseException:  # interrupted meanwhile: the process, if there is one, ends with its input
+                    _remove(job)
+                    raise
             time.sleep(_POLL)
             for entry in list(running):
                 job, process, own, started = entry
@@ -144,6 +148,10 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 def _tidy(job: Job, process: subprocess.Popen[bytes]) -> None:
     if process.stdin is not None:
         process.stdin.close()
+    _remove(job)
+
+
+def _remove(job: Job) -> None:
     for suffix in (".job", ".stderr"):
         job.path.with_suffix(suffix).unlink(missing_ok=True)
 
