@@ -17,7 +17,9 @@ const MANY_TRIANGLES: usize = 100_000;
 
 /// Whether the command line asks for what has this name, or for nothing in particular.
 fn is_wanted(name: &str) -> bool {
-    let mut filters = std::env::args().skip(1).filter(|a| !a.starts_with('-')).peekable();
+    // Numbers are the values of options.
+    let is_filter = |a: &String| !a.starts_with('-') && a.parse::<f64>().is_err();
+    let mut filters = std::env::args().skip(1).filter(is_filter).peekable();
     filters.peek().is_none() || filters.any(|f| name.contains(&f))
 }
 
