@@ -21,6 +21,7 @@ __all__ = ["observe"]
 
 # Moments at which a cell is looked at; cells with fewer steps at each of them.
 _LOOKS = 40
+_STANDARD_GRAVITY = 9.80665  # m/s²
 
 
 def observe(setup: Setup) -> dict[str, Any]:
@@ -53,7 +54,7 @@ def observe(setup: Setup) -> dict[str, Any]:
         facts.update(error=str(error), error_type=type(error).__name__)
         watch.look()
     totals = json.loads(simulation._core.summary())["totals"]
-    grown = growth(watch.entries, watch.least)
+    grown = growth(watch.entries, watch.allowed)
     facts.update(watch.facts, growth=grown.most, growth_left=grown.left, time=simulation.time, dt=dt)
     facts["steps_asked"] = steps
     facts.update({k: totals[k] for k in ("steps", "substeps", "retries", "not_converged", "zones", "held_vertices")})
@@ -79,9 +80,9 @@ class _Watch:
         self._origin = self._x.mean(axis=0)
         contact = data.get("contact")
         self._meets = contact is not None
-        # What contact does within its thickness is not told from rest: see `clothsim.stability.energy`.
+        # What contact does within its thickness: see `clothsim.stability.energy`.
         thickness = float(contact["thickness"]) if contact is not None else 0.0
-        self.least = float(self._masses.sum() * np.linalg.norm(self._gravity)) * thickness
+        self.allowed = float(self._masses.sum()) * _STANDARD_GRAVITY * thickness
         self.facts: dict[str, Any] = {"finite": True, "intersections": 0, "passed": 0}
         self.entries: list[Entry] = []
         self._labels: Ints | None = None
