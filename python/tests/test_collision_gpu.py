@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import GPU_METHODS
 
 import clothsim as cs
 
-METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
 
 
@@ -26,20 +26,7 @@ def soup(seed: int, count: int = 150) -> tuple[Any, Any, Any]:
     return x, x + rng.normal(0, 0.1, x.shape), np.arange(3 * count).reshape(-1, 3)
 
 
-@pytest.fixture(scope="module")
-def gpu() -> str:
-    """Name of the adapter; skips where there is none."""
-    x = np.eye(3)
-    try:
-        found = cs.collision.detect(x, x, [[0, 1, 2]], "grid", device="gpu")
-    except cs.GpuUnavailable as reason:
-        if os.environ.get("CLOTHSIM_REQUIRE_GPU") == "1":
-            pytest.fail(f"CLOTHSIM_REQUIRE_GPU=1, but {reason}")
-        pytest.skip(str(reason))
-    return str(found.stats["device"])
-
-
-@pytest.mark.parametrize("method", [*METHODS, "auto"])
+@pytest.mark.parametrize("method", [*GPU_METHODS, "auto"])
 @pytest.mark.parametrize("mode", ["continuous", "discrete"])
 @pytest.mark.parametrize("thickness", [0.0, 0.02])
 def test_the_gpu_finds_what_the_cpu_finds(gpu: str, method: str, mode: str, thickness: float) -> None:
@@ -65,7 +52,7 @@ def test_threads_that_call_at_once_all_get_the_contacts(gpu: str) -> None:
     found: dict[int, cs.collision.Detection] = {}
 
     def work(k: int) -> None:
-        found[k] = cs.collision.detect(*frames[k], METHODS[k], device="gpu", threads=1)
+        found[k] = cs.collision.detect(*frames[k], GPU_METHODS[k], device="gpu", threads=1)
 
     workers = [threading.Thread(target=work, args=(k,)) for k in range(len(frames))]
     for worker in workers:
@@ -103,7 +90,7 @@ def test_a_mesh_that_stays_on_the_gpu_is_not_taken_for_another(gpu: str) -> None
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", GPU_METHODS)
 def test_no_triangles_have_no_contacts(gpu: str, method: str) -> None:
     x = np.zeros((3, 3))
     found = cs.collision.detect(x, x, np.zeros((0, 3), dtype=np.int64), method, device="gpu")

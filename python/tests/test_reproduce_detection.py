@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import without_gpu
 
 import clothsim as cs
 from clothsim import collision
@@ -21,15 +20,6 @@ from clothsim.reproduce.benchmarks import Benchmark, Suite
 
 ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
 QUICK = Effort(quick=True, threads=2)
-
-
-@pytest.fixture(scope="module")
-def gpu() -> str:
-    """Name of the adapter; skips where there is none."""
-    try:
-        return str(cs.collision.detect(np.eye(3), np.eye(3), [[0, 1, 2]], "grid", device="gpu").stats["device"])
-    except cs.GpuUnavailable as reason:
-        without_gpu(reason)
 
 
 # Contacts -----------------------------------------------------------------------------------------------------------
