@@ -107,7 +107,7 @@ fn stats_to_dict<'py>(py: Python<'py>, detected: &Detected) -> PyResult<Bound<'p
     dict.set_item("candidates_vertex_triangle", stats.candidates_vertex_triangle)?;
     dict.set_item("candidates_edge_edge", stats.candidates_edge_edge)?;
     dict.set_item("root_searches", stats.root_searches)?;
-    for (name, count) in &detected.counts {
+    for (name, count) in &stats.counts {
         dict.set_item(*name, *count)?;
     }
     let seconds = PyDict::new(py);

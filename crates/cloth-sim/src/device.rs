@@ -131,14 +131,12 @@ pub struct Adapter {
 /// The contacts, who found them, and why not somebody else.
 #[derive(Debug)]
 pub struct Detected {
-    /// The contacts; the same for every method on every device.
+    /// The contacts, the same for every method on every device; of a GPU, the counts hold the `bytes` of the method on the device.
     pub contacts: Contacts,
     /// Name of the method.
     pub method: &'static str,
     /// `"cpu"`, or the adapter with its driver.
     pub device: String,
-    /// What only this method counts: registrations, parts or leaves, bytes on the device; none on the CPU.
-    pub counts: Vec<(&'static str, u64)>,
     /// Why the CPU, where a GPU would have been taken.
     pub reason: Option<Reason>,
 }
@@ -304,5 +302,5 @@ fn detect_on_cpu(
 ) -> Result<Detected, DeviceError> {
     let x: &[Vec3] = query.x_t0;
     let contacts = collision::detector(method, mesh, x)?.detect(mesh, query, pool)?;
-    Ok(Detected { contacts, method, device: "cpu".to_owned(), counts: vec![], reason })
+    Ok(Detected { contacts, method, device: "cpu".to_owned(), reason })
 }

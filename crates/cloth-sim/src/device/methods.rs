@@ -12,45 +12,17 @@ const CELL_FACTOR: f64 = 1.2;
 pub(crate) trait GpuMethod: Detector + std::fmt::Debug {
     /// Memory on the device \[B\].
     fn bytes(&self) -> u64;
-
-    /// What the last call counted beside [`crate::collision::DetectStats`].
-    fn counted(&self) -> Vec<(&'static str, u64)>;
 }
-
-/// Names of an octree's registrations by level, the root first.
-const BY_LEVEL: [&str; 11] = [
-    "registrations_level_0",
-    "registrations_level_1",
-    "registrations_level_2",
-    "registrations_level_3",
-    "registrations_level_4",
-    "registrations_level_5",
-    "registrations_level_6",
-    "registrations_level_7",
-    "registrations_level_8",
-    "registrations_level_9",
-    "registrations_level_10",
-];
 
 impl GpuMethod for GridGpu {
     fn bytes(&self) -> u64 {
         Self::bytes(self)
-    }
-
-    fn counted(&self) -> Vec<(&'static str, u64)> {
-        vec![("registrations", self.registrations()), ("parts", self.parts())]
     }
 }
 
 impl GpuMethod for OctreeGpu {
     fn bytes(&self) -> u64 {
         Self::bytes(self)
-    }
-
-    fn counted(&self) -> Vec<(&'static str, u64)> {
-        let mut counts = Self::counted(self).to_vec();
-        counts.extend(BY_LEVEL.into_iter().zip(self.per_level().iter().map(|&n| u64::from(n))));
-        counts
     }
 }
 
