@@ -181,7 +181,7 @@ def test_figure_5_14_sees_too_few_and_too_many() -> None:
         counts = {}
         for b, factor in zip(suite.benchmarks, factors, strict=True):
             counts[b.name, counting.GRID], counts[b.name, counting.VIRTUAL] = counted(factor * 1e6), counted(1e6)
-        return failing(figure.checks(figure.Measured(suite, counts)))
+        return failing(figure.checks(counting.Compared(suite, counts)))
 
     assert of(12.0, 9.0, 2.0) == []
     assert of(7.9, 9.0, 9.0) == ["N-body: at least 8 times fewer tests"]
@@ -213,7 +213,7 @@ def test_figure_6_10_sees_too_many_tests_of_the_octree() -> None:
         tests = {counting.GRID: 9e6, counting.VIRTUAL: virtual, counting.SINGLE: single, counting.OCTREE: octree}
         counts = {("Funnel", method): counted(t) for method, t in tests.items()}
         counts |= {("N-body", method): counted(t) for method, t in zip(tests, (9e6, 5e6, 2e6, 2e6), strict=True)}
-        return failing(figure.checks(figure.Measured(suite, counts)))
+        return failing(figure.checks(counting.Compared(suite, counts)))
 
     assert of(1e6, 7e5, 6.1e5) == []
     assert of(1e6, 7e5, 6.2e5) == ["at least 39 % fewer tests than virtual subdivision, each benchmark"]
