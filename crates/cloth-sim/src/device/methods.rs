@@ -2,7 +2,7 @@
 
 use super::Tuning;
 use crate::collision::{CollisionMesh, DetectError, Detector};
-use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions, OctreeGpu, OctreeOptions};
+use crate::gpu::{Distribution, Duplicates, Gpu, GpuError, GridGpu, GridOptions, OctreeGpu, OctreeOptions};
 use std::sync::Arc;
 
 /// λ of virtual subdivision where nothing else is asked for (thesis 5.3).
@@ -33,8 +33,16 @@ pub(crate) fn build(
     method: &'static str,
     tuning: &Tuning,
 ) -> Result<Box<dyn GpuMethod>, DetectError> {
+    let distribution = match tuning.distribution {
+        Some("segmented-scan") => Distribution::SegmentedScan,
+        _ => Distribution::BinarySearch,
+    };
+    let duplicates = match tuning.duplicates {
+        Some("all") => Duplicates::All,
+        _ => Duplicates::OneSort,
+    };
     let grid = |gpu, subdivision| {
-        let options = GridOptions { subdivision, ..GridOptions::default() };
+        let options = GridOptions { subdivision, distribution, duplicates, ..GridOptions::default() };
         Ok(Box::new(GridGpu::with_options(gpu, mesh, options)?) as Box<dyn GpuMethod>)
     };
     let octree = |gpu, two_stage| {
@@ -129,7 +137,7 @@ mod tests {
         for (swapped, tuning) in [
             (false, Tuning::default()),
             (true, Tuning::default()),
-            (false, Tuning { cell_factor: Some(3.0) }),
+            (false, Tuning { cell_factor: Some(3.0), ..Tuning::default() }),
             (false, Tuning::default()),
             (false, Tuning::default()),
         ] {
