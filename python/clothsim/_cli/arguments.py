@@ -17,7 +17,7 @@ def add_existing(parser: argparse.ArgumentParser, what: str) -> None:
     """What to do with what the output folder holds already, and whether to show progress."""
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument("--resume", action="store_true", help=f"go on with an unfinished {what} in OUT, or start one")
-    mode.add_argument("--overwrite", action="store_true", help=f"replace a {what} that OUT holds")
+    mode.add_argument("--overwrite", action="store_true", help=f"replace the {what} that OUT holds")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
 
 
