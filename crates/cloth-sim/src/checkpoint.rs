@@ -6,6 +6,7 @@
 
 use crate::auto_step::Control;
 use crate::constraints::Holds;
+use crate::ledger::Ledger;
 use crate::pace::{Pace, Pending, UnderWay};
 use crate::step::State;
 use crate::{Assets, Report, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
@@ -43,6 +44,10 @@ impl Simulation {
         payload.u64(u64::from(self.state.pace.good));
         payload.f64(self.state.pace.control.size);
         payload.f64(self.state.pace.control.error);
+        let ledger = self.state.pace.ledger;
+        payload.u64(u64::from(ledger.open));
+        payload.f64(ledger.level);
+        payload.f64(ledger.scale);
         payload.numbers(&self.memory());
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
         payload.u64(pending.steps);
@@ -114,7 +119,8 @@ impl Simulation {
             return Err(invalid(format!("at most {most} halvings"), halvings.to_string()));
         }
         let control = Control { size: payload.f64()?, error: payload.f64()? };
-        let pace = Pace { halvings: halvings as u32, good: good as u32, control };
+        let ledger = Ledger { open: payload.u64()? != 0, level: payload.f64()?, scale: payload.f64()? };
+        let pace = Pace { halvings: halvings as u32, good: good as u32, control, ledger };
         let memory = payload.numbers()?;
         let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
         let under_way = if payload.u64()? == 0 { None } else { Some(payload.under_way(1 << most)?) };

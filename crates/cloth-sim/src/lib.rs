@@ -27,6 +27,7 @@ mod constraints;
 mod contact;
 mod error;
 mod guard;
+mod ledger;
 mod motion;
 mod pace;
 mod pins;

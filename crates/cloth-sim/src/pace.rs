@@ -10,6 +10,7 @@
 
 use crate::auto_step::Control;
 use crate::guard::Alarm;
+use crate::ledger::{self, Ledger};
 use crate::report::{Refused, add_seconds};
 use crate::step::Failure;
 use crate::{SimError, Simulation, StepReport};
@@ -30,6 +31,7 @@ pub(crate) struct Pace {
     pub(crate) good: u32,
     /// Under `time.dt = "auto"`.
     pub(crate) control: Control,
+    pub(crate) ledger: Ledger,
 }
 
 impl Pace {
@@ -189,6 +191,7 @@ impl Simulation {
         let started = Instant::now();
         let whole = 1_u64 << self.scene.time.max_halvings;
         let fraction = |units: u64| units as f64 / whole as f64;
+        let least = way.dt * 0.5_f64.powi(ledger::MAX_HALVINGS.min(self.scene.time.max_halvings) as i32);
         let pace = self.state.pace;
         // The parts of a doubled size end where whole ones do.
         if pace.good >= GROW_AFTER && way.done.is_multiple_of(2 * (whole >> pace.halvings)) {
@@ -199,7 +202,7 @@ impl Simulation {
             let last = way.done + size == whole;
             let t1 = if last { way.end } else { way.start + way.dt * fraction(way.done + size) };
             let dt = way.dt * fraction(size);
-            let failure = match self.attempt(t1, dt, &mut way.report) {
+            let failure = match self.attempt(t1, dt, [way.dt, least], &mut way.report) {
                 Ok(()) => {
                     #[cfg(test)]
                     self.accepted.push([t1, dt]);
@@ -261,6 +264,9 @@ impl Simulation {
         match failure {
             Failure::Alarm(Alarm { reason, vertices }) => SimError::Diverged { time, reason, vertices },
             Failure::Unresolved { pairs, vertices } => SimError::Stuck { time, pairs, vertices },
+            Failure::Energy { .. } => {
+                SimError::Diverged { time, reason: failure.to_string(), vertices: Vec::new() }
+            }
             Failure::Device(reason) => SimError::Stage { stage: "detection", message: reason },
             Failure::Stop(error) => error,
         }

@@ -107,6 +107,9 @@ pub struct StepReport {
     /// Size of the smallest sub-step [s]; under `time.dt = "auto"` the step's, which is taken in two halves.
     #[serde(default)]
     pub smallest_dt: f64,
+    /// Energy that contact made out of nothing, and smaller sub-steps too [J].
+    #[serde(default)]
+    pub energy_made: f64,
     /// Attempts refused because of their error, under `time.dt = "auto"`.
     #[serde(default)]
     pub rejected: u32,
@@ -228,6 +231,9 @@ pub struct Totals {
     /// Steps whose estimated error is above the tolerance all the same.
     #[serde(default)]
     pub above_tolerance: u64,
+    /// Energy that contact made out of nothing, smaller sub-steps too [J].
+    #[serde(default)]
+    pub energy_made: f64,
     /// Size of the largest step [s].
     #[serde(default)]
     pub largest_dt: f64,
@@ -356,6 +362,7 @@ impl Report {
         t.retries += u64::from(step.retries);
         t.rejected += u64::from(step.rejected);
         t.above_tolerance += u64::from(step.above_tolerance);
+        t.energy_made += step.energy_made;
         t.largest_dt = t.largest_dt.max(step.dt);
         t.reduced += u64::from(step.smallest_dt < step.dt);
         if t.smallest_dt.is_none_or(|dt| step.smallest_dt < dt) {

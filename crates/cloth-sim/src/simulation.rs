@@ -50,6 +50,8 @@ pub struct Simulation {
     pub(crate) contact: Option<ContactStage>,
     pub(crate) guard: Guard,
     pub(crate) inv_mass: Vec<f64>,
+    /// Whether steps are judged by their energy, see [`crate::ledger`].
+    pub(crate) audited: bool,
     pub(crate) state: State,
     pub(crate) pending: Option<Pending>,
     /// A step of which some parts have been accepted.
@@ -163,6 +165,7 @@ impl Simulation {
             integrator,
             contact,
             inv_mass,
+            audited: is_passive(scene),
             state,
             pending: None,
             under_way: None,
@@ -353,6 +356,13 @@ impl Simulation {
         }
         format!("triangle {triangle}")
     }
+}
+
+/// Whether nothing but pins and colliders can add energy, and the integrator adds none.
+fn is_passive(scene: &Scene) -> bool {
+    let air = &scene.air;
+    let wind = air.wind != [0.0; 3] && (air.damping > 0.0 || air.density * (air.drag + air.lift) > 0.0);
+    !wind && !scene.time.integrator.is_explicit()
 }
 
 fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, SimError> {

@@ -75,6 +75,11 @@ pub(crate) enum Failure {
         pairs: Vec<[u32; 4]>,
         vertices: Vec<u32>,
     },
+    /// Contact made so much energy beyond what there may be [J].
+    Energy {
+        made: f64,
+        level: f64,
+    },
     /// The GPU gave no answer, for this reason.
     Device(String),
     /// Not a matter of the step's size.
@@ -120,6 +125,9 @@ impl std::fmt::Display for Failure {
         match self {
             Self::Alarm(alarm) => write!(f, "diverged: {}", alarm.reason),
             Self::Unresolved { pairs, .. } => write!(f, "stuck: {} pairs still collide", pairs.len()),
+            Self::Energy { made, level } => {
+                write!(f, "contact made {made:.3e} J of mechanical energy beyond {level:.3e} J")
+            }
             Self::Device(reason) => write!(f, "no answer of the GPU: {reason}"),
             Self::Stop(error) => error.fmt(f),
         }
@@ -127,9 +135,18 @@ impl std::fmt::Display for Failure {
 }
 
 impl Simulation {
-    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace.
-    pub(crate) fn attempt(&mut self, t1: f64, dt: f64, report: &mut StepReport) -> Result<(), Failure> {
-        let trial = self.trial(t1, dt, report)?;
+    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace. Part of a step of `whole` \[s\];
+    /// at `least` \[s\] energy that contact makes is accepted and reported.
+    pub(crate) fn attempt(
+        &mut self,
+        t1: f64,
+        dt: f64,
+        [whole, least]: [f64; 2],
+        report: &mut StepReport,
+    ) -> Result<(), Failure> {
+        let mut trial = self.trial(t1, dt, report)?;
+        let floor = dt <= least || 0.5 * dt < self.scene.time.dt_min;
+        trial.state.pace.ledger = self.audit(&trial.state, whole, floor, report)?;
         trial.note(report);
         self.commit(trial.state);
         Ok(())
