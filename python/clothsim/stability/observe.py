@@ -31,7 +31,7 @@ def observe(setup: Setup) -> dict[str, Any]:
 
     Errors of the engine are facts too; then the state that it kept is looked at as well.
     """
-    started = time.perf_counter()
+    started = time.process_time()
     facts: dict[str, Any] = {"finite": True, "time": 0.0, "started": False}
     try:
         simulation = Simulation(setup.scene, threads=1, device="cpu")
@@ -53,7 +53,7 @@ def observe(setup: Setup) -> dict[str, Any]:
     grown = growth(watch.entries, watch.allowed)
     facts.update(watch.facts, growth=grown.most, growth_left=grown.left, time=simulation.time)
     facts.update({k: totals[k] for k in ("steps", "substeps", "retries", "not_converged", "zones", "held_vertices")})
-    facts["seconds"] = time.perf_counter() - started
+    facts["cpu_seconds"] = time.process_time() - started
     return facts
 
 

@@ -21,7 +21,7 @@ FILES = ("stability.json", "stability.csv", "README.md", "overview.png", "overvi
 
 _COLUMNS = (
     "verdict", "promised", "why", "time", "steps", "substeps", "retries", "growth", "growth_left", "intersections",
-    "passed", "not_converged", "zones", "held_vertices", "seconds",
+    "passed", "not_converged", "zones", "held_vertices", "cpu_seconds",
 )  # fmt: skip
 
 
