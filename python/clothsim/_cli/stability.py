@@ -6,10 +6,10 @@ import argparse
 import json
 import shlex
 import sys
-from pathlib import Path
 from typing import Any
 
-from clothsim._cli.study import count, fixed_values, interruptible
+from clothsim._cli.arguments import add_existing, count, folder
+from clothsim._cli.study import fixed_values, interruptible
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
 
@@ -24,7 +24,7 @@ EXAMPLE = "clothsim stability stretch plates --quick -o out/stability"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which cells, and how to run."""
     parser.add_argument("cases", metavar="CASE", nargs="*", help="names that --list gives (default: all)")
-    parser.add_argument("-o", "--out", metavar="OUT", type=_folder, help="folder for tables and maps")
+    parser.add_argument("-o", "--out", metavar="OUT", type=folder, help="folder for tables and maps")
     parser.add_argument("--list", action="store_true", help="list the cases with their parameters")
     parser.add_argument("--quick", action="store_true", help="a few cells of each case")
     parser.add_argument(
@@ -37,16 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--jobs", metavar="N", type=count, help="cells side by side (default: one per core)")
     parser.add_argument("--limit", metavar="S", type=_seconds, help="seconds that a cell may take (default 60)")
-    mode = parser.add_mutually_exclusive_group()
-    mode.add_argument("--resume", action="store_true", help="go on with an unfinished atlas in OUT, or start one")
-    mode.add_argument("--overwrite", action="store_true", help="replace an atlas that OUT holds")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
-
-
-def _folder(text: str) -> Path:
-    if not text.strip():
-        raise argparse.ArgumentTypeError(f"expected a folder, got {text!r}")
-    return Path(text)
+    add_existing(parser, "atlas")
 
 
 def _seconds(text: str) -> float:
