@@ -79,6 +79,7 @@ def test_an_interrupted_atlas_goes_on_where_it_stopped(tmp_path: Path, run_cli: 
         (("strech",), "did you mean 'stretch'?"),
         (("stretch", "--at", "stifness=1"), "did you mean 'stiffness'?"),
         (("stretch", "--at", "dt"), "expected NAME=VALUE"),
+        (("stretch", "--at", "dt=1e-3", "--at", "dt=1e-2"), "expected it once"),
         (("stretch", "--at", "dt=0"), "expected a number > 0 [s]"),
         (("stretch", "--at", "dt=fast"), "expected a number > 0 [s]"),
         (("integrators", "--at", "integrator=rk5"), "did you mean 'rk4'?"),
