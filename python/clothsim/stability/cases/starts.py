@@ -92,7 +92,7 @@ CASES = (
         "intersecting",
         "Starts that intersect",
         "An upright sheet reaches through a level one. The default has to refuse it with the number of pairs; with "
-        "intersections allowed none may be added; untangled it has to start without any, or be refused with the number.",
+        "intersections allowed none may be added; untangled it has to start without, or be refused with the number.",
         Axis("depth", (1e-9, 1e-6, 1e-3, 0.01, 0.05), (1e-6, 0.05), "m", "depth"),
         Axis("start", _STARTS, _STARTS, "", "what is done about it"),
         _intersecting,
