@@ -59,10 +59,11 @@ impl Plan {
     pub(crate) fn note_untangled(&mut self, done: &crate::Untangled) {
         if let Some(effect) = self.effects.iter_mut().find(|e| e.name == UNTANGLED) {
             effect.elements = done.moved.len();
-            effect.why += &match done.pairs {
-                0 => ": nothing passed through anything".to_owned(),
-                n => format!(": {n} pairs resolved, vertices moved by at most {:.3e} m", done.largest),
+            let what = match done.pairs {
+                0 => "nothing passed through anything".to_owned(),
+                n => format!("{n} pairs resolved, vertices moved by at most {:.3e} m", done.largest),
             };
+            effect.why = format!("{}: {what}", effect.why);
         }
     }
 }

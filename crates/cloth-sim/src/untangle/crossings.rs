@@ -88,7 +88,7 @@ fn crossing(mesh: &CollisionMesh, x: &[Vec3], edge: [u32; 2], triangle: u32) -> 
     let area = n.norm_squared();
     let part = |u: Vec3, v: Vec3| (u - s).cross(&(v - s)).dot(&n) / area;
     let weights = [part(b, c), part(c, a), part(a, b)];
-    if weights.iter().any(|w| !(*w >= -SAME)) {
+    if weights.iter().any(|w| w.is_nan() || *w < -SAME) {
         return None;
     }
     Some(Crossing { edge, at, triangle, weights: weights.map(|w| w.max(0.0)), normal: n.try_normalize(0.0)? })
