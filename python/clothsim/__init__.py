@@ -13,7 +13,7 @@ Examples
 (121, 3)
 """
 
-from clothsim import bending, collision, errors, friction, study
+from clothsim import bending, collision, errors, friction, stability, study
 from clothsim._core import __version__
 from clothsim.animation import Animation
 from clothsim.errors import (
@@ -70,5 +70,6 @@ __all__ = [
     "friction",
     "materials",
     "record",
+    "stability",
     "study",
 ]
