@@ -121,8 +121,8 @@ class Scene:
             Unique among all bodies.
         **keys
             Further keys of a ``[[cloth]]`` table: ``position`` [m], ``rotation``, ``velocity`` [m/s],
-            ``velocities`` (n, 3) [m/s], ``rest``, ``warp``, ``self_collision``, ``pins``, ``friction``,
-            ``self_friction``, ``strain_limit``.
+            ``velocities`` (n, 3) [m/s], ``rest``, ``warp``, ``self_collision``, ``pins``, ``regions``, ``seams``,
+            ``friction``, ``self_friction``, ``strain_limit``.
         """
         table = {"name": name, "mesh": mesh, "material": material, **keys}
         self._append("cloth", self._cloth_table(table, f"cloth[{len(self._data['cloth'])}]"))

@@ -38,7 +38,9 @@ pub(crate) fn parts(
         } else if let Some(list) = &region.vertices {
             check_indices(scene, source, list, x.len(), "vertex", &format!("{key}.vertices"))?;
             let mut inside = vec![false; x.len()];
-            list.iter().for_each(|&v| inside[v as usize] = true);
+            for &v in list {
+                inside[v as usize] = true;
+            }
             ("vertices", corners_all(&|v| inside[v as usize]))
         } else {
             let Some(region) = region.region else { continue };
@@ -51,7 +53,9 @@ pub(crate) fn parts(
             return Err(scene.error(&format!("{key}.{name}"), expected, "none"));
         }
         check_indices(scene, source, &triangles, mesh.triangles.len(), "triangle", &format!("{key}.{name}"))?;
-        triangles.iter().for_each(|&t| part_of[t as usize] = i + 1);
+        for t in triangles {
+            part_of[t as usize] = i + 1;
+        }
     }
     for (t, &part) in part_of.iter().enumerate() {
         parts[part].1.push(t as u32);

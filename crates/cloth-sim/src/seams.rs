@@ -167,9 +167,9 @@ fn along(
     }
     let mut sorted = vertices.clone();
     sorted.sort_unstable();
-    if let Some(twice) = sorted.windows(2).find(|w| w[0] == w[1]) {
+    if let Some([twice, _]) = sorted.windows(2).find(|w| w[0] == w[1]) {
         let expected = "a run that meets each vertex once (more vertices on the way say which way round)";
-        return Err(scene.error(key, expected, format!("vertex {} twice", twice[0])));
+        return Err(scene.error(key, expected, format!("vertex {twice} twice")));
     }
     let whole = length[length.len() - 1];
     let share = length.iter().map(|l| l / whole).collect();

@@ -38,7 +38,7 @@ impl Stitch {
 
 /// All stitches of a scene at one time.
 pub(crate) struct Stitches {
-    stitches: Vec<Stitch>,
+    threads: Vec<Stitch>,
     vertices: Vec<u32>,
     /// l(t) of each [m].
     length: Vec<f64>,
@@ -49,12 +49,12 @@ impl Stitches {
     pub(crate) fn new(stitches: Vec<Stitch>) -> Self {
         let vertices = stitches.iter().flat_map(|s| s.vertices).collect();
         let length = stitches.iter().map(|s| s.length(0.0)).collect();
-        Self { stitches, vertices, length }
+        Self { threads: stitches, vertices, length }
     }
 
     /// x_1 − x_0 of a taut thread and β; none of a slack one.
     fn taut(&self, element: usize, x: &[Vec3]) -> Option<(Vec3, f64)> {
-        let [a, b] = self.stitches[element].vertices.map(|i| i as usize);
+        let [a, b] = self.threads[element].vertices.map(|i| i as usize);
         let d = x[b] - x[a];
         let (r, l) = (d.norm(), self.length[element]);
         // l = 0: β is 1 also where there is no direction.
@@ -72,8 +72,8 @@ impl ForceModel for Stitches {
     fn info(&self) -> EffectInfo {
         EffectInfo {
             name: "stitches",
-            elements: self.stitches.len(),
-            bytes: size_of_val(self.stitches.as_slice())
+            elements: self.threads.len(),
+            bytes: size_of_val(self.threads.as_slice())
                 + size_of_val(self.vertices.as_slice())
                 + size_of_val(self.length.as_slice()),
         }
@@ -96,7 +96,7 @@ impl ForceModel for Stitches {
     }
 
     fn set_time(&mut self, time: f64) {
-        for (length, stitch) in self.length.iter_mut().zip(&self.stitches) {
+        for (length, stitch) in self.length.iter_mut().zip(&self.threads) {
             *length = stitch.length(time);
         }
     }
@@ -111,7 +111,7 @@ impl ForceModel for Stitches {
     ) {
         for element in range {
             if let Some((d, beta)) = self.taut(element, x) {
-                energy.stretch += 0.5 * self.stitches[element].stiffness * (beta * beta) * d.norm_squared();
+                energy.stretch += 0.5 * self.threads[element].stiffness * (beta * beta) * d.norm_squared();
             }
         }
     }
@@ -129,7 +129,7 @@ impl ForceModel for Stitches {
             // k (r − l) u = k β (x_1 − x_0)
             f[0] = self
                 .taut(element, x)
-                .map_or_else(Vec3::zeros, |(d, beta)| d * (self.stitches[element].stiffness * beta));
+                .map_or_else(Vec3::zeros, |(d, beta)| d * (self.threads[element].stiffness * beta));
             f[1] = -f[0];
         }
     }
@@ -152,7 +152,7 @@ impl ForceModel for Stitches {
                 *block = [0.0; 9];
                 continue;
             };
-            let Stitch { vertices: [a, b], stiffness, .. } = self.stitches[element];
+            let Stitch { vertices: [a, b], stiffness, .. } = self.threads[element];
             let u = d.try_normalize(0.0).unwrap_or_default();
             let w = v[b as usize] - v[a as usize];
             // K_x v on corner 0: k [(1 − β)(w·u) u + β w].

@@ -3,6 +3,7 @@
 use super::{Friction, Keyframe, MeshSource, Rotation, Up};
 use cloth_collision::shapes::Shape;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// A body that moves as prescribed and that cloth meets. Exactly one of `shape`, `mesh` and `sequence`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -138,7 +139,8 @@ impl SequenceSource {
         let Some(file) = &self.file else { return self.asset.clone().unwrap_or_default() };
         let up = self.up.map(|up| if up == Up::Z { "z" } else { "y" }.to_owned());
         // The frames of an archive are the same at any rate.
-        let fps = self.fps.filter(|_| !file.ends_with(".npz")).map(|fps| fps.to_string());
+        let is_archive = Path::new(file).extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("npz"));
+        let fps = self.fps.filter(|_| !is_archive).map(|fps| fps.to_string());
         let asked = [
             ("fps", fps),
             ("scale", self.scale.map(|scale| scale.to_string())),
