@@ -17,7 +17,7 @@ from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
 from clothsim.study.resolution import set_resolution
 
-__all__ = ["NAMED", "Axis", "apply", "axis", "axis_kind", "parse", "value_text", "variant"]
+__all__ = ["NAMED", "RUN_AXES", "Axis", "apply", "axis", "axis_kind", "parse", "value_text", "variant"]
 
 # Names for keys of a scene that studies vary most.
 _KEYS = {
@@ -42,6 +42,7 @@ _OTHER = {
     "hinges": "coupled or independent, of every material's bending law",
     "threads": "threads of the run",
     "device": "device of collision detection",
+    "precision": "f64, or f32: the state is kept in single precision from step to step",
 }
 NAMED = {**_KEYS, **_OTHER}
 # Tables and keys of a scene at the top level, where a path may begin.
@@ -49,10 +50,24 @@ _ROOTS = ("time", "solver", "air", "contact", "cloth", "collider", "output", "gr
 # Smaller is finer, or larger is; these do not change what the exact answer is.
 _REFINES = {"time.dt": -1, "solver.tolerance": -1, "time.newton_tolerance": -1, "resolution": 1}
 _NUMERIC_ONLY = {
-    *_REFINES, "time.integrator", "time.indefinite", "time.bending_substeps", "time.newton_max_iterations",
-    "time.max_halvings", "solver.method", "solver.max_iterations", "contact.detector", "contact.method",
-    "contact.max_passes", "contact.max_zone_passes", "threads", "device",
-}  # fmt: skip
+    *_REFINES,
+    "time.integrator",
+    "time.indefinite",
+    "time.bending_substeps",
+    "time.newton_max_iterations",
+    "time.max_halvings",
+    "solver.method",
+    "solver.max_iterations",
+    "contact.detector",
+    "contact.method",
+    "contact.max_passes",
+    "contact.max_zone_passes",
+    "threads",
+    "device",
+    "precision",
+}
+# How a run is made: no part of a scene.
+RUN_AXES = ("threads", "device", "precision")  # fmt: skip
 _MOST_VALUES = 1000
 
 
@@ -229,7 +244,7 @@ def apply(data: dict[str, Any], key: str, value: Any) -> None:
     InvalidInput
         The scene has nothing that it applies to.
     """
-    if key in ("threads", "device"):
+    if key in RUN_AXES:
         return
     if key == "resolution":
         set_resolution(data, value)
