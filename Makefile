@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema validation stability clean
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema validation gallery stability clean
 
 help: ## List the targets
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -56,6 +56,9 @@ compare: build ## Detection side by side with IPC Toolkit, in one run (installs 
 
 schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 	$(BIN)/clothsim schema > docs/scene.schema.json
+
+gallery: build ## Make all studies of the gallery again (about ten minutes; times count only on an idle machine)
+	$(BIN)/python tools/gallery.py
 
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
