@@ -45,6 +45,7 @@ def test_values_are_read_as_toml_words_and_rows() -> None:
         ("dt=", "expected NAME=VALUE"),
         ("dt=0.1,0.1", "expected each value once"),
         ("dt=1:2:x", "first:last:count"),
+        ("dt=nan,1e-3", "axis dt: expected finite numbers, got nan"),
     ],
 )
 def test_what_is_no_axis_is_refused(text: str, message: str) -> None:

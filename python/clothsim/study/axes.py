@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import difflib
 import itertools
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -141,6 +142,8 @@ def axis(name: str, values: Any) -> Axis:
         expected = f"1 to {_MOST_VALUES} values"
         raise InvalidInput(f"axis {name}: expected {expected}, got {len(found)}", name=name, expected=expected)
     texts = [value_text(v) for v in found]
+    if wild := [t for t, v in zip(texts, found, strict=True) if isinstance(v, float) and not math.isfinite(v)]:
+        raise InvalidInput(f"axis {name}: expected finite numbers, got {', '.join(wild)}", name=name, got=wild[0])
     twice = sorted({t for t in texts if texts.count(t) > 1})
     if twice:
         raise InvalidInput(f"axis {name}: expected each value once, got {', '.join(twice)} twice", name=name)
