@@ -6,11 +6,13 @@ import difflib
 
 from clothsim.errors import InvalidInput
 from clothsim.stability.case import Case
-from clothsim.stability.cases import impacts, meshes, squeezed, stiffness
+from clothsim.stability.cases import extremes, impacts, masses, meshes, piles, squeezed, starts, stiffness, tangles
 
 __all__ = ["CATALOGUE", "find"]
 
-CATALOGUE: tuple[Case, ...] = (*stiffness.CASES, *meshes.CASES, *impacts.CASES, *squeezed.CASES)
+_GROUPS = (stiffness, masses, meshes, impacts, squeezed, tangles, piles, starts, extremes)
+
+CATALOGUE: tuple[Case, ...] = tuple(case for group in _GROUPS for case in group.CASES)
 
 
 def find(name: str) -> Case:

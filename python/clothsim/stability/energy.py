@@ -6,12 +6,12 @@ stand still,
 
     growth = max over t₁ < t₂ of E(t₂) − E(t₁),    relative to what was available,
 
-    available = E(start of the stretch) − lowest energy in the field of gravity,
+    available = E(start of the stretch) − lowest energy in the field of gravity.
 
-but no less than what contact may do anyway, as it rests at a distance: lift all the cloth by the thickness, M |g| h.
-Kinetic energy and gravity come from positions, velocities and masses here; elastic energy is the engine's. While pins
-or colliders move, the work that they do is not known from positions alone: the account rests, and starts anew when they
-stand.
+What contact may do anyway, as it rests at a distance, is no growth, and no less than that is available: lifting all the
+cloth by the thickness h in standard gravity, M g h. Kinetic energy and gravity come from positions, velocities and
+masses here; elastic energy is the engine's. While pins or colliders move, the work that they do is not known from
+positions alone: the account rests, and starts anew when they stand.
 
 A step that is too large for what it meets shows as growth that is taken away again by an implicit integrator. A run
 that has not come back from it in its last quarter has run away: ``left`` is the growth since the start of the last
@@ -75,26 +75,26 @@ class Growth:
     left: float
 
 
-def growth(entries: Sequence[Entry], least: float = 0.0) -> Growth:
+def growth(entries: Sequence[Entry], allowed: float = 0.0) -> Growth:
     """Growth of the energy; the worst of the stretches between motions from outside.
 
     Parameters
     ----------
     entries : sequence of Entry
         In the order of time.
-    least : float
-        What counts as available at least [J]; the rounding of E does anyway.
+    allowed : float
+        What contact may add [J]; the rounding of E counts as that anyway.
     """
     most, left, first = 0.0, 0.0, 0
     for k in range(1, len(entries) + 1):
         if k == len(entries) or entries[k].driven:
-            own = _stretch(entries[first:k], least)
+            own = _stretch(entries[first:k], allowed)
             most, first = max(most, own.most), k
             left = own.left  # of the last stretch
     return Growth(most, left)
 
 
-def _stretch(entries: Sequence[Entry], least: float) -> Growth:
+def _stretch(entries: Sequence[Entry], allowed: float) -> Growth:
     own = np.array([e.total for e in entries])
     if not np.isfinite(own).all():
         return Growth(float("inf"), float("inf"))
@@ -102,8 +102,8 @@ def _stretch(entries: Sequence[Entry], least: float) -> Growth:
     available = start.total - min(e.gravity for e in entries)
     # Sums of terms of this size are not known any better.
     rounding = 1e-12 * (abs(start.kinetic) + abs(start.elastic) + abs(start.gravity))
-    floor = max(rounding, np.finfo(float).tiny)
-    risen = float(np.max(own - np.minimum.accumulate(own)))
-    stays = float(np.min(own[-max(1, len(own) // 4) :] - own[0]))
-    available = max(available, least, floor)
-    return Growth(risen / available if risen > floor else 0.0, max(0.0, stays) / available)
+    allowed = max(allowed, rounding, np.finfo(float).tiny)
+    available = max(available, allowed)
+    risen = float(np.max(own - np.minimum.accumulate(own))) - allowed
+    stays = float(np.min(own[-max(1, len(own) // 4) :] - own[0])) - allowed
+    return Growth(max(0.0, risen) / available, max(0.0, stays) / available)

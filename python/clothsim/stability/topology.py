@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from clothsim._arrays import Floats, Ints
 from clothsim.stability.case import Sides
 
-__all__ = ["above", "beyond", "inside", "linking_number", "order_of_sheets", "outside_of", "together"]
+__all__ = ["above", "beyond", "drumhead", "inside", "linking_number", "order_of_sheets", "together"]
 
 
 def above(normal: Sequence[float], height: float = 0.0) -> Sides:
@@ -25,9 +25,19 @@ def beyond(collider: slice, normal: Sequence[float]) -> Sides:
     return lambda x, c: np.sign((x - c[collider].mean(axis=0)) @ direction).astype(np.int64)
 
 
-def outside_of(collider: slice, radius: float) -> Sides:
-    """Label vertices by whether they are in a sphere about the mean of some collider vertices [m]."""
-    return lambda x, c: (np.linalg.norm(x - c[collider].mean(axis=0), axis=1) > radius).astype(np.int64)
+def drumhead(border: Ints, triangles: Ints) -> Callable[[Floats, Floats], Ints]:
+    """Label whether a point (3,) is still on its side of a sheet in y = 0 whose border is held.
+
+    Sheet and a flat cap over its border are a closed surface: the point is in it if it is below the cap, and above the
+    sheet. Both have to change together.
+    """
+    cap = np.column_stack([np.full(len(border) - 2, border[0]), border[1:-1], border[2:]])
+    closed = np.concatenate([triangles, cap])
+
+    def label(x: Floats, point: Floats) -> Ints:
+        return np.abs(inside(point[None], x, closed)) - int(point[1] < 0.0)
+
+    return label
 
 
 def inside(points: Floats, vertices: Floats, triangles: Ints) -> Ints:

@@ -9,7 +9,7 @@ import numpy as np
 from clothsim._arrays import Floats, Ints
 from clothsim.mesh import Mesh
 
-__all__ = ["THICKNESS", "grid", "springs", "tent"]
+__all__ = ["THICKNESS", "border", "grid", "springs", "tensor_sheet"]
 
 # Distance of contact in cases that do not vary it [m].
 THICKNESS = 0.004
@@ -24,12 +24,18 @@ def springs(stiffness: float, density: float = 0.15, damping: float = 0.0, rigid
     }
 
 
+def border(n: int) -> Ints:
+    """Vertices around a grid of n × n, in order."""
+    edge = np.arange(n - 1)
+    return np.concatenate([edge, (n - 1) + n * edge, n * n - 1 - edge, n * (n - 1 - edge)])
+
+
 def grid(width: float, nx: int, height: float | None = None, nz: int | None = None) -> dict[str, Any]:
     """A rectangle of ``nx`` × ``nz`` vertices in the xz-plane [m]; a square by default."""
     return {"generator": "grid", "width": width, "height": height or width, "nx": nx, "ny": nz or nx}
 
 
-def tent(x: Floats, z: Floats, y: Floats | float = 0.0) -> Mesh:
+def tensor_sheet(x: Floats, z: Floats, y: Floats | float = 0.0) -> Mesh:
     """A sheet over a tensor grid of coordinates x (i) and z (j) [m], heights ``y`` (j, i) or one; row by row in x."""
     across, along = np.meshgrid(x, z)
     points = np.stack([across, np.broadcast_to(y, across.shape), along], axis=-1).reshape(-1, 3)

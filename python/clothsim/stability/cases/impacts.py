@@ -2,62 +2,45 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from clothsim._arrays import Floats, Ints
 from clothsim.mesh import Mesh
 from clothsim.scene import Scene
-from clothsim.stability.case import Axis, Case, Setup, Sides, dt_axis
-from clothsim.stability.cases.common import THICKNESS
-from clothsim.stability.topology import inside
+from clothsim.stability.case import Axis, Case, Setup, dt_axis
+from clothsim.stability.cases.common import THICKNESS, border
+from clothsim.stability.topology import drumhead
 
 __all__ = ["CASES"]
 
-_RADIUS = 0.1
+_RADIUS, _GAP = 0.1, 0.02
 
 
-def _ball(**keys: Any) -> dict[str, Any]:
-    return {"name": "ball", "shape": {"type": "sphere", "radius": _RADIUS, "tolerance": 2e-3}, **keys}
-
-
-def drumhead(size: int, border: Ints, triangles: Ints) -> Sides:
-    """Label whether the ball is still on its side of a sheet in y = 0 whose border is held.
-
-    Sheet and a flat cap over its border are a closed surface: the ball's middle is in it if it is below the cap, and
-    above the sheet. Both have to change together.
-    """
-    cap = np.column_stack([np.full(size - 2, border[0]), border[1:-1], border[2:]])
-    closed = np.concatenate([triangles, cap])
-
-    def sides(x: Floats, colliders: Floats) -> Ints:
-        middle = colliders.mean(axis=0)
-        return np.abs(inside(middle[None], x, closed)) - int(middle[1] < 0.0)
-
-    return sides
-
-
-def _border(n: int) -> Ints:
-    """Vertices around a grid of n × n, in order."""
-    edge = np.arange(n - 1)
-    return np.concatenate([edge, (n - 1) + n * edge, n * n - 1 - edge, n * (n - 1 - edge)])
+def _struck(dt: float, travel: float, way: float, seconds: float) -> Setup:
+    """A ball goes down by ``travel`` [m] within ``way`` [s], from above a sheet whose border is held."""
+    n, start = 13, _RADIUS + _GAP
+    sheet = Mesh.grid(0.4, 0.4, n, n)
+    edge = border(n)
+    moves = [{"time": t, "position": [0.0, y, 0.0]} for t, y in ((0.0, start), (way, start - travel))]
+    shape = {"type": "sphere", "radius": _RADIUS, "tolerance": 2e-3}
+    scene = Scene(
+        duration=seconds, time={"dt": dt}, contact={"thickness": THICKNESS},
+        cloth=[{"name": "sheet", "mesh": sheet, "material": "cotton", "pins": [{"vertices": edge}]}],
+        collider=[{"name": "ball", "shape": shape, "keyframes": moves}],
+    )  # fmt: skip
+    label = drumhead(edge, np.asarray(sheet.triangles))
+    return Setup(scene, lambda x, colliders: label(x, colliders.mean(axis=0)))
 
 
 def _sphere(dt: float, speed: float) -> Setup:
-    """A ball comes down on a sheet from 0.02 m above it, pushes its middle 0.15 m down and stops."""
-    n, travel = 13, 0.17
-    start, way = _RADIUS + 0.02, travel / speed
-    sheet = Mesh.grid(0.4, 0.4, n, n)
-    border = _border(n)
-    moves = [{"time": t, "position": [0.0, y, 0.0]} for t, y in ((0.0, start), (way, start - travel))]
-    scene = Scene(
-        duration=max(1.5 * way, 200.0 * dt if dt < 1e-3 else 8.0 * dt), time={"dt": dt},
-        contact={"thickness": THICKNESS},
-        cloth=[{"name": "sheet", "mesh": sheet, "material": "cotton", "pins": [{"vertices": border}]}],
-        collider=[_ball(keyframes=moves)],
-    )  # fmt: skip
-    return Setup(scene, drumhead(len(border), border, np.asarray(sheet.triangles)))
+    """It pushes the middle of the sheet 0.15 m down and stops."""
+    travel = 0.15 + _GAP
+    way = travel / speed
+    return _struck(dt, travel, way, max(1.5 * way, 200.0 * dt if dt < 1e-3 else 8.0 * dt))
+
+
+def _jump(dt: float, jump: float) -> Setup:
+    """It is elsewhere from one step to the next."""
+    return _struck(dt, jump, 1e-9, max(0.02, 12.0 * dt))
 
 
 CASES = (
@@ -69,5 +52,14 @@ CASES = (
         dt_axis(),
         Axis("speed", (1.0, 3.0, 10.0, 30.0, 100.0), (3.0, 100.0), "m/s", "speed of the ball"),
         _sphere,
+    ),
+    Case(
+        "jump",
+        "A collider that jumps",
+        "The same ball is above the sheet and, a nanosecond later, so far below: in it, just through it, or metres "
+        "away. It has to take the sheet along, or the run has to stop.",
+        dt_axis(),
+        Axis("jump", (0.01, 0.05, 0.15, 0.3, 1.0, 10.0), (0.05, 0.3), "m", "way of the jump"),
+        _jump,
     ),
 )
