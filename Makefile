@@ -63,7 +63,7 @@ gallery: build ## Make all studies of the gallery again (about ten minutes; time
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
 
-stability: build ## Run the stability atlas, every case over its whole map (half an hour); writes stability/
+stability: build ## Run the stability atlas, every case over its whole map (minutes); writes stability/
 	$(BIN)/clothsim stability -o stability --overwrite
 
 clean: ## Remove what the targets above made
