@@ -57,7 +57,7 @@ compare: build ## Detection side by side with IPC Toolkit, in one run (installs 
 schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 	$(BIN)/clothsim schema > docs/scene.schema.json
 
-gallery: build ## Make all studies of the gallery again (about ten minutes; times count only on an idle machine)
+gallery: build ## Make all studies of the gallery again (five minutes on two idle cores; only there times count)
 	$(BIN)/python tools/gallery.py
 
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
