@@ -30,7 +30,10 @@ mod motion;
 mod pins;
 mod plan;
 mod precision;
+mod regions;
 mod report;
+mod restart;
+mod seams;
 mod simulation;
 mod step;
 
