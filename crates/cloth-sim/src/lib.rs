@@ -29,6 +29,7 @@ mod guard;
 mod motion;
 mod pins;
 mod plan;
+mod precision;
 mod regions;
 mod report;
 mod restart;
