@@ -29,7 +29,10 @@ mod guard;
 mod motion;
 mod pins;
 mod plan;
+mod regions;
 mod report;
+mod restart;
+mod seams;
 mod simulation;
 mod step;
 
