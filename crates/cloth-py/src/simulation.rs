@@ -206,6 +206,12 @@ impl PySimulation {
         json(py, &fallbacks)
     }
 
+    /// The detectors that were chosen by measuring, as JSON.
+    fn choices(&self, py: Python<'_>) -> PyResult<String> {
+        let choices = self.read(py, |simulation| simulation.report().choices.clone());
+        json(py, &choices)
+    }
+
     /// The reports of the steps from number `first` (from 0, those left out counted) on, as JSON.
     fn steps(&self, py: Python<'_>, first: usize) -> PyResult<String> {
         let steps = self.read(py, |simulation| simulation.report().steps_from(first).to_vec());

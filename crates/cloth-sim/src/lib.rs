@@ -41,7 +41,7 @@ pub use assets::{Assets, Sequence};
 pub use bodies::{BodyInfo, BodyKind};
 pub use error::SimError;
 pub use plan::{Effect, Plan};
-pub use report::{ContactReport, Detection, EffectCost, Fallback, Report, StepReport, Totals};
+pub use report::{Chosen, ContactReport, Detection, EffectCost, Fallback, Report, StepReport, Totals};
 pub use scene::{Scene, SceneError};
 pub use simulation::{Advance, Simulation, SimulationOptions};
 

@@ -5,7 +5,7 @@
 
 use crate::bodies::Bodies;
 use crate::constraints::{Holds, failure};
-use crate::contact::{ContactStage, stage};
+use crate::contact::{ContactStage, seconds_of_detection, stage};
 use crate::guard::Alarm;
 use crate::pins::PinSet;
 use crate::report::add_seconds;
@@ -132,11 +132,12 @@ impl Simulation {
     }
 
     /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace.
-    fn attempt(&mut self, t1: f64, dt: f64, report: &mut StepReport) -> Result<(), Failure> {
+    pub(crate) fn attempt(&mut self, t1: f64, dt: f64, report: &mut StepReport) -> Result<(), Failure> {
         #[cfg(test)]
         if (self.fail)(self.state.time, dt) {
             return Err(Failure::Alarm(Alarm { reason: "planted".into(), vertices: vec![0] }));
         }
+        let started = Instant::now();
         let (mut x, mut v) = (self.state.x.clone(), self.state.v.clone());
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
@@ -145,11 +146,13 @@ impl Simulation {
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let v_free = self.contact.is_some().then(|| v.clone());
+        let mut detection = 0.0;
         if let Some(info) = self.response(dt, &mut x, &mut v, report)? {
             self.check(&x, &v, report)?;
             let contact = report.contact.get_or_insert_default();
             contact.add(&info);
             contact.add_constraints(&holds, solves);
+            detection = seconds_of_detection(&info);
         }
 
         report.newton_iterations += dynamics.newton_iterations;
@@ -171,6 +174,7 @@ impl Simulation {
         self.state.x = x;
         self.state.v = v;
         self.state.time = t1;
+        self.accept_contact([detection, started.elapsed().as_secs_f64()]);
         Ok(())
     }
 
