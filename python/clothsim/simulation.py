@@ -174,7 +174,7 @@ class Simulation:
             bool(allow_intersections),
             start,
         )
-        self._logged = 0
+        self._logged = self._logged_choices = 0
         self._log_fallbacks()
 
     @classmethod
@@ -242,6 +242,7 @@ class Simulation:
         simulation = cls.__new__(cls)
         simulation._core = core
         simulation._logged = sum(f["step"] < core.step_count for f in json.loads(core.fallbacks()))
+        simulation._logged_choices = len(json.loads(core.choices()))
         simulation._log_fallbacks()
         return simulation
 
@@ -255,12 +256,21 @@ class Simulation:
             )
         self._logged = len(fallbacks)
 
+    def _log_choices(self) -> None:
+        """Say once of each detector that was chosen by measuring since when, and why."""
+        choices = json.loads(self._core.choices())
+        for c in choices[self._logged_choices :]:
+            keys = ("detector", "device", "step", "why")
+            _logger.info('detector "%s" on %s after step %d: %s', *(c[key] for key in keys))
+        self._logged_choices = len(choices)
+
     @contextlib.contextmanager
     def _stepping(self) -> Iterator[None]:
         try:
             yield
         finally:
             self._log_fallbacks()
+            self._log_choices()
 
     # Stepping --------------------------------------------------------------------------------------------------
 
@@ -425,7 +435,8 @@ class Simulation:
     def report(self) -> dict[str, Any]:
         """What happened so far: ``steps`` (one table each), ``totals``, ``effects`` with their cost, ``threads``.
 
-        ``detection`` says which detector runs where and why, ``fallbacks`` which GPUs were done without since when.
+        ``detection`` says which detector runs where and why, ``fallbacks`` which GPUs were done without since when,
+        ``choices`` what ``contact.detector = "auto"`` chose by measuring.
         ``left_out`` counts the first steps that a checkpoint had no tables of; ``totals`` and ``effects`` have them.
         """
         report: dict[str, Any] = json.loads(self._core.summary())

@@ -50,7 +50,7 @@ def frames(sim: cs.Simulation, count: int = FRAMES) -> np.ndarray[Any, Any]:
 
 
 def test_frames_are_those_of_the_cpu(gpu: str, tmp_path: Path) -> None:
-    cpu = cs.Simulation(cs.Scene.load(falling(tmp_path / "scene.toml")), device="cpu")
+    cpu = cs.Simulation(cs.Scene.load(falling(tmp_path / "scene.toml", "bvh")), device="cpu")
     expected = frames(cpu)
     assert sum(step["contact"]["collisions"] for step in cpu.report["steps"]) > 50
     assert cpu.report["detection"]["detector"] == "bvh"
@@ -76,7 +76,7 @@ def test_the_command_line_runs_on_the_gpu(gpu: str, tmp_path: Path, run_cli: Run
         np.testing.assert_array_equal(array, arrays[1][name])
     on_gpu, on_cpu = (report["detection"] for report in reports)
     assert (on_gpu["detector"], on_gpu["device"], on_gpu["why"]) == ("virtual-subdivision", gpu, 'device "gpu"')
-    assert (on_cpu["detector"], on_cpu["device"], on_cpu["why"]) == ("bvh", "cpu", 'device "cpu"')
+    assert on_cpu["device"] == "cpu" and "measured" in on_cpu["why"]
     assert [report["fallbacks"] for report in reports] == [[], []]
     plan = run_cli("plan", scene, "--device", "gpu")
     assert f'detection: "virtual-subdivision" on {gpu} (device "gpu")' in plan.stdout

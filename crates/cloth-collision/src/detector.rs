@@ -17,6 +17,11 @@ pub trait Detector: Send {
         true
     }
 
+    /// Memory of the host that it keeps from call to call \[B\], its tree included; 0 where that is next to nothing.
+    fn host_bytes(&self) -> usize {
+        0
+    }
+
     /// All contacts of the query: unique, sorted, the same bits for any number of threads.
     ///
     /// # Errors

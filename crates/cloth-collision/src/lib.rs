@@ -49,7 +49,10 @@ pub use nearest::Nearest;
 pub use session::{
     Adapt, FrameKind, Frames, MOST_FRAMES, SessionOptions, SessionStats, SkippingSession, Variant,
 };
-pub use stencil::{Stencil, StencilKind, stencil_at_contact_edge_edge, stencil_at_contact_vertex_triangle};
+pub use stencil::{
+    Stencil, StencilKind, plane, side, stencil_at_contact, stencil_at_contact_edge_edge,
+    stencil_at_contact_vertex_triangle,
+};
 
 /// A point [m] in space.
 pub type Vec3 = cloth_mesh::Vec3;

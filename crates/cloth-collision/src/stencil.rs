@@ -1,6 +1,7 @@
 //! Two points in contact, as weights on four vertices.
 
 use crate::distance::{edge_edge, vertex_triangle};
+use crate::intersect::height_of;
 use crate::{CollisionMesh, Vec3};
 
 /// The two kinds of stencil.
@@ -42,6 +43,30 @@ impl Stencil {
         let normal = if distance > DIRECTION_FLOOR * size(p) { r / distance } else { plane_normal(kind, p) };
         Self { kind, vertices, weights, normal, distance }
     }
+
+    /// Whether the distance at the points `p` \[m\] of the vertices is above rounding, so that the normal is the direction of r;
+    /// else it is the plane's.
+    pub fn has_direction(&self, p: &[Vec3; 4]) -> bool {
+        self.distance > DIRECTION_FLOOR * size(p)
+    }
+}
+
+/// The side of the first feature: the sign (1, 0, −1) of n · (first − second), without rounding, with the normal
+/// n = (b−a)×(c−a) of the triangle or n = (a1−a0)×(b1−b0) of the edges; 0 for four points in a plane.
+pub fn side(kind: StencilKind, p: &[Vec3; 4]) -> i8 {
+    let [a, b, c, d] = p;
+    // Negative where the last point is on the side to which the normal of the first three points.
+    let below = match kind {
+        StencilKind::VertexTriangle => height_of(b, c, d, a),
+        StencilKind::EdgeEdge => height_of(a, b, c, d),
+    };
+    i8::from(below < 0.0) - i8::from(below > 0.0)
+}
+
+/// The unit vector along n of [`side`]; `None` where rounding leaves none (no area, parallel edges).
+pub fn plane(kind: StencilKind, p: &[Vec3; 4]) -> Option<Vec3> {
+    let (n, size) = (cross(kind, p), size(p));
+    (n.norm() > DIRECTION_FLOOR * size * size).then(|| n.normalize())
 }
 
 /// r = Σ w_k p_k, from differences to p0 so that a far origin costs no digits.
@@ -64,10 +89,8 @@ fn cross(kind: StencilKind, p: &[Vec3; 4]) -> Vec3 {
 /// The unit normal of the stencil's plane; where there is none (no area, parallel edges), a unit vector across its
 /// longest side, or +y.
 fn plane_normal(kind: StencilKind, p: &[Vec3; 4]) -> Vec3 {
-    let n = cross(kind, p);
-    let size = size(p);
-    if n.norm() > DIRECTION_FLOOR * size * size {
-        return n.normalize();
+    if let Some(n) = plane(kind, p) {
+        return n;
     }
     let longest = (1..4).map(|k| p[k] - p[0]).max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
     let d = longest.unwrap_or_default();
@@ -85,7 +108,7 @@ fn plane_normal(kind: StencilKind, p: &[Vec3; 4]) -> Vec3 {
 ///
 /// Weights: closest points at `time`. Normal: the direction from the second point to the first at `time` or, where
 /// their distance is rounding noise there, a little earlier (the side from which they came). Where they touch all
-/// the way from t0, the plane's normal, on the side where the vertex was at t0, else against the relative motion.
+/// the way from t0, the plane's normal, on the side where the vertex was at t0 ([`side`]), else against the relative motion.
 pub fn stencil_at_contact_vertex_triangle(
     mesh: &CollisionMesh,
     pair: [u32; 2],
@@ -94,7 +117,7 @@ pub fn stencil_at_contact_vertex_triangle(
     x_t1: &[Vec3],
 ) -> Stencil {
     let [a, b, c] = mesh.triangles[pair[1] as usize];
-    at_contact(StencilKind::VertexTriangle, [pair[0], a, b, c], time, x_t0, x_t1)
+    stencil_at_contact(StencilKind::VertexTriangle, [pair[0], a, b, c], time, x_t0, x_t1, 0)
 }
 
 /// The stencil of a continuous contact of two edges at `time`; weights and normal as in
@@ -107,7 +130,7 @@ pub fn stencil_at_contact_edge_edge(
     x_t1: &[Vec3],
 ) -> Stencil {
     let ([a0, a1], [b0, b1]) = (mesh.edges[pair[0] as usize], mesh.edges[pair[1] as usize]);
-    at_contact(StencilKind::EdgeEdge, [a0, a1, b0, b1], time, x_t0, x_t1)
+    stencil_at_contact(StencilKind::EdgeEdge, [a0, a1, b0, b1], time, x_t0, x_t1, 0)
 }
 
 fn closest_weights(kind: StencilKind, p: &[Vec3; 4]) -> [f64; 4] {
@@ -123,7 +146,17 @@ fn closest_weights(kind: StencilKind, p: &[Vec3; 4]) -> [f64; 4] {
     }
 }
 
-fn at_contact(kind: StencilKind, vertices: [u32; 4], time: f64, x_t0: &[Vec3], x_t1: &[Vec3]) -> Stencil {
+/// The stencil of a continuous contact of these vertices at `time`, see [`stencil_at_contact_vertex_triangle`].
+///
+/// `known`: the pair's [`side`] as it is known from before the step, for points that lie in one plane at t0; 0: unknown.
+pub fn stencil_at_contact(
+    kind: StencilKind,
+    vertices: [u32; 4],
+    time: f64,
+    x_t0: &[Vec3],
+    x_t1: &[Vec3],
+    known: i8,
+) -> Stencil {
     let start = vertices.map(|v| x_t0[v as usize]);
     let end = vertices.map(|v| x_t1[v as usize]);
     let at = |t: f64| [0, 1, 2, 3].map(|k| start[k] * (1.0 - t) + end[k] * t);
@@ -147,7 +180,12 @@ fn at_contact(kind: StencilKind, vertices: [u32; 4], time: f64, x_t0: &[Vec3], x
     }
     let mut normal = plane_normal(kind, &now);
     let motion: [Vec3; 4] = [0, 1, 2, 3].map(|k| end[k] - start[k]);
-    if separation(&motion, &weights).dot(&normal) > 0.0 {
+    let is_other_side = match (plane(kind, &now), side(kind, &start)) {
+        (Some(_), 0) if known != 0 => known < 0,
+        (Some(_), side) if side != 0 => side < 0,
+        _ => separation(&motion, &weights).dot(&normal) > 0.0,
+    };
+    if is_other_side {
         normal = -normal;
     }
     Stencil { kind, vertices, weights, normal, distance: separation(&now, &weights).norm() }

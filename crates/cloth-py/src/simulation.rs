@@ -104,6 +104,11 @@ impl PySimulation {
         self.detached(py, |simulation| simulation.step().map_err(Box::new))
     }
 
+    /// Round positions and velocities of the cloth to f32.
+    fn round_state(&self, py: Python<'_>) {
+        py.detach(|| self.lock().round_state());
+    }
+
     /// Advance in equal steps; Ctrl-C is looked for before each. Returns the number of steps.
     fn advance(&self, py: Python<'_>, seconds: f64) -> PyResult<usize> {
         self.interruptible(py, |simulation, check| simulation.advance(seconds, check).map_err(Box::new))
@@ -199,6 +204,12 @@ impl PySimulation {
     fn fallbacks(&self, py: Python<'_>) -> PyResult<String> {
         let fallbacks = self.read(py, |simulation| simulation.report().fallbacks.clone());
         json(py, &fallbacks)
+    }
+
+    /// The detectors that were chosen by measuring, as JSON.
+    fn choices(&self, py: Python<'_>) -> PyResult<String> {
+        let choices = self.read(py, |simulation| simulation.report().choices.clone());
+        json(py, &choices)
     }
 
     /// The reports of the steps from number `first` (from 0, those left out counted) on, as JSON.

@@ -94,6 +94,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let start = Instant::now();
         let info = responder.respond(&mesh, &mut bvh, &inv_mass, &x, &mut x_t1, &mut v, dt, &pool)?;
+        responder.accept();
         let spent = start.elapsed().as_secs_f64();
         x = x_t1;
         cpu += spent;

@@ -5,10 +5,11 @@ use crate::friction::kernel::Kernel;
 use crate::impulse::{Contact, NormalLaw};
 use crate::motion::Motion;
 use crate::repulsion::rest_gap;
+use crate::sides::{Side, Sides};
 use crate::{ResponseParams, Vec3};
 use cloth_collision::{
     Bvh, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, StencilKind, edge_edge_ccd,
-    stencil_at_contact_edge_edge, stencil_at_contact_vertex_triangle, vertex_triangle_ccd,
+    stencil_at_contact, vertex_triangle_ccd,
 };
 
 /// Impulse passes look for pairs that come nearer than this fraction of the thickness (h/1000 in the thesis), so
@@ -59,13 +60,11 @@ impl Hit {
         rest_x: &[Vec3],
         motion: &Motion<'_>,
         kernel: &K,
+        sides: &Sides,
     ) -> Option<Contact<K::State>> {
-        let at_contact = match self.kind {
-            StencilKind::VertexTriangle => stencil_at_contact_vertex_triangle,
-            StencilKind::EdgeEdge => stencil_at_contact_edge_edge,
-        };
         let (x_t0, x_t1) = (motion.x_t0, &motion.buffers.end);
-        let stencil = at_contact(mesh, self.pair, self.time, x_t0, x_t1);
+        let known = sides.get(self.kind, self.vertices).map_or(0, Side::sign);
+        let stencil = stencil_at_contact(self.kind, self.vertices, self.time, x_t0, x_t1, known);
         let gap = rest_gap(&stencil, mesh, params, rest_x);
         let start: Vec3 = (0..4).map(|k| x_t0[stencil.vertices[k] as usize] * stencil.weights[k]).sum();
         let gap_t0 = stencil.normal.dot(&start);

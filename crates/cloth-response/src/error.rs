@@ -31,6 +31,14 @@ pub enum ResponseError {
         /// Index of the first such vertex.
         vertex: usize,
     },
+    /// The side of a pair that a checkpoint has cannot be.
+    #[error("side of pair {pair}: expected {expected}, got others")]
+    Side {
+        /// Its place in the list.
+        pair: usize,
+        /// What is needed.
+        expected: &'static str,
+    },
     /// Detection refused its input.
     #[error(transparent)]
     Detect(#[from] cloth_collision::DetectError),

@@ -5,6 +5,10 @@
 pub struct ResponseInfo {
     /// Pairs within the thickness at `x_t0`.
     pub proximities: usize,
+    /// Those of them whose side is remembered.
+    pub remembered: usize,
+    /// Pairs whose normal their side decided: they touch but for rounding, or went through.
+    pub by_side: usize,
     /// Continuous detections over the step, the first (over all pairs) included.
     pub passes: usize,
     /// Pairs that collided in the first of them: what the repulsion left.

@@ -18,6 +18,7 @@ mod params;
 mod repulsion;
 mod respond;
 mod rigid_motion;
+mod sides;
 mod stages;
 mod strain;
 mod sweeps;
@@ -29,6 +30,7 @@ pub use friction::rule::FrictionRule;
 pub use info::ResponseInfo;
 pub use params::ResponseParams;
 pub use respond::Responder;
+pub use sides::{Side, Sides};
 pub use strain::{LimitedEdge, StrainLimit};
 
 /// A point [m], velocity [m/s] or impulse [N s] in space.

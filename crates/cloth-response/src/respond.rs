@@ -7,13 +7,13 @@ use crate::motion::{Motion, MotionBuffers};
 use crate::stages::Stages;
 use crate::strain::limiter::Limiter;
 use crate::sweeps::ContactSet;
-use crate::{LimitedEdge, ResponseError, ResponseInfo, ResponseParams, Vec3};
+use crate::{LimitedEdge, ResponseError, ResponseInfo, ResponseParams, Sides, Vec3};
 use cloth_collision::{Bvh, CollisionMesh, Detector};
 
 /// Turns the unconstrained end of a step into an accepted one.
 ///
-/// Holds parameters and reusable buffers, no state that a checkpoint would miss: a step's answer depends on the
-/// arguments alone, and not on the number of threads.
+/// Holds parameters, reusable buffers, and the [`Sides`] of near pairs, which a checkpoint has to have: a step's answer depends on
+/// these and on the arguments alone, and not on the number of threads.
 pub struct Responder {
     params: ResponseParams,
     buffers: MotionBuffers,
@@ -77,6 +77,22 @@ impl Responder {
         }
         self.stages.limiter = Limiter::new(edges);
         Ok(())
+    }
+
+    /// Takes the last response as the step that happened: its sides of near pairs are remembered. Without this the next response
+    /// decides as the last one did, so that a step may be tried again.
+    pub fn accept(&mut self) {
+        self.stages.accept();
+    }
+
+    /// The remembered sides of near pairs.
+    pub fn sides(&self) -> &Sides {
+        &self.stages.sides
+    }
+
+    /// Goes on with these sides of near pairs.
+    pub fn set_sides(&mut self, sides: Sides) {
+        self.stages.sides = sides;
     }
 
     /// Memory of the buffers that are kept from step to step \[B\]: what each vertex needs from the start, and what the

@@ -7,6 +7,7 @@ use crate::hold::hold_back;
 use crate::landing::follow;
 use crate::motion::{Motion, bytes_of};
 use crate::repulsion::{self, BAND};
+use crate::sides::Sides;
 use crate::strain::limiter::Limiter;
 use crate::sweeps::ContactSet;
 use crate::zones::{Zones, move_zones};
@@ -29,6 +30,11 @@ pub(crate) struct Stages {
     frames: Frames,
     zones: Zones,
     hits: Vec<Hit>,
+    /// Sides of the near pairs of the last accepted step.
+    pub(crate) sides: Sides,
+    /// Those of the step that may yet be accepted.
+    next_sides: Option<Sides>,
+    spare_sides: Sides,
     /// Contacts on sides and corners that are in the set already.
     shared: HashSet<[u32; 4]>,
 }
@@ -43,7 +49,17 @@ impl Stages {
             + self.frames.bytes()
             + self.zones.bytes()
             + bytes_of(&self.hits)
+            + self.sides.bytes()
+            + self.next_sides.as_ref().map_or(0, Sides::bytes)
+            + self.spare_sides.bytes()
             + slots
+    }
+
+    /// Takes over what the last run found out about sides.
+    pub(crate) fn accept(&mut self) {
+        if let Some(next) = self.next_sides.take() {
+            self.spare_sides = std::mem::replace(&mut self.sides, next);
+        }
     }
 
     /// Changes the motion so that it has no known collision and keeps the strain limits.
@@ -54,7 +70,8 @@ impl Stages {
         detection: &mut Detection<'_>,
         motion: &mut Motion<'_>,
     ) -> Result<ResponseInfo, ResponseError> {
-        let Self { rest_x, limiter, frames, zones, hits, shared } = self;
+        let mut sides = self.next_sides.take().unwrap_or_else(|| std::mem::take(&mut self.spare_sides));
+        let Self { rest_x, limiter, frames, zones, hits, shared, .. } = self;
         let (mesh, x_t0) = (detection.mesh, motion.x_t0);
         let mut info = ResponseInfo::default();
         let mut clock = Clock(Instant::now());
@@ -64,8 +81,10 @@ impl Stages {
         hits.clear();
 
         // 1. Near pairs at the start: resting contact and repulsion.
-        let near = detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, None, detection.pool)?;
+        let mut near = detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, None, detection.pool)?;
         info.proximities = near.len();
+        info.by_side = sides.renew(&self.sides, &mut near, mesh, motion);
+        info.remembered = sides.pairs().len();
         clock.lap(&mut info, "proximity");
         shared.clear();
         follow(&near, mesh, &motion.buffers.end, |pair| {
@@ -83,9 +102,9 @@ impl Stages {
         let mut judge = |hits: &mut Vec<Hit>| {
             if params.allow_initial_contacts {
                 hits.retain(|hit| {
-                    let out = hit.touches_at_start(x_t0);
+                    let out = hit.touches_at_start(x_t0) || sides.is_through(hit.kind, hit.vertices);
                     if out {
-                        exempt.insert(hit.key());
+                        exempt.insert((hit.kind, hit.vertices));
                     }
                     !out
                 });
@@ -103,7 +122,8 @@ impl Stages {
             while !hits.is_empty() && info.passes < most {
                 for hit in hits.iter() {
                     answered.insert(hit.key());
-                    if let Some(contact) = hit.contact(mesh, params, rest_x, motion, &contacts.kernel) {
+                    if let Some(contact) = hit.contact(mesh, params, rest_x, motion, &contacts.kernel, &sides)
+                    {
                         contacts.push(contact);
                     }
                 }
@@ -157,6 +177,8 @@ impl Stages {
             clock.lap(&mut info, "strain");
         }
         info.exempt = exempt.len();
+        sides.end_step(|kind, vertices| exempt.contains(&(kind, vertices)));
+        self.next_sides = Some(sides);
         Ok(info)
     }
 }

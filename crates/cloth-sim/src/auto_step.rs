@@ -16,6 +16,7 @@ use crate::constraints::Holds;
 use crate::step::{Failure, State, Trial, touches};
 use crate::{SimError, Simulation, StepReport, Vec3};
 use cloth_core::Method;
+use cloth_response::Sides;
 use std::time::Instant;
 
 /// Size of the first attempt [s], where `time.dt_max` allows it: most cloth scenes start from rest.
@@ -87,6 +88,10 @@ struct Doubled {
     state: State,
     /// Estimated error of the two halves [m].
     error: f64,
+    /// Sides of near pairs at the start, for an attempt that is refused; those of the middle stand.
+    sides: Option<Sides>,
+    /// Of continuous detection, and of all [s].
+    seconds: [f64; 2],
 }
 
 impl Simulation {
@@ -104,7 +109,7 @@ impl Simulation {
             control.size = control.size.clamp(time.dt_min, time.dt_max);
             let (dt, t1) = cut(start, end, control.size);
             let failure = match self.doubled(t1, dt, order, &mut report) {
-                Ok(Doubled { state, error }) => {
+                Ok(Doubled { state, error, sides, seconds }) => {
                     let ratio = error / (SHARE * time.dt_tolerance);
                     let last = report.rejected == MAX_REJECTED || dt <= time.dt_min;
                     if ratio <= 1.0 || last {
@@ -112,12 +117,13 @@ impl Simulation {
                         report.above_tolerance = ratio > 1.0;
                         (report.dt, report.smallest_dt, report.substeps) = (dt, dt, 2);
                         report.error = Some(error);
-                        self.commit(state);
+                        self.commit(state, seconds);
                         self.state.pace.control = control.accepted(dt, ratio, order, refused);
                         #[cfg(test)]
                         self.accepted.push([t1, dt]);
                         return self.finish_step(report, started.elapsed().as_secs_f64());
                     }
+                    self.remember_sides(sides);
                     report.rejected += 1;
                     control = control.rejected(dt, ratio, order);
                     continue;
@@ -143,14 +149,25 @@ impl Simulation {
         let whole = self.trial(t1, dt, report)?;
         let first = self.trial(self.state.time + 0.5 * dt, 0.5 * dt, report)?;
         let touched = [&self.state, &whole.state, &first.state].into_iter().any(touches);
+        let sides = self.contact.as_ref().map(|contact| contact.responder.sides().clone());
+        if let Some(contact) = &mut self.contact {
+            contact.responder.accept();
+        }
         let start = std::mem::replace(&mut self.state, first.state.clone());
         let result = self.second_half(t1, dt, order, touched, &whole, report);
         self.state = start;
-        let (second, end, error) = result?;
+        let (second, end, error) = match result {
+            Ok(done) => done,
+            Err(failure) => {
+                self.remember_sides(sides);
+                return Err(failure);
+            }
+        };
         whole.note_work(report);
         first.note(report);
         second.note(report);
-        Ok(Doubled { state: end, error })
+        let [a, b, c] = [&whole, &first, &second].map(Trial::seconds);
+        Ok(Doubled { state: end, error, sides, seconds: [0, 1].map(|k| a[k] + b[k] + c[k]) })
     }
 
     /// From the middle of a step, where the state is: the second half, the step's end, and its estimated error [m].
@@ -178,14 +195,16 @@ impl Simulation {
             (0..b.len()).map(|i| if free(i) { b[i] + (b[i] - a[i]) * share } else { b[i] }).collect()
         };
         let (x, v) = (beyond(&a.x, &b.x), beyond(&a.v, &b.v));
-        let checked = self.check(&x, &v, report);
-        let end = match checked.and_then(|()| self.meet(t1, 0.5 * dt, x, v, Holds::default(), report)) {
-            Ok((state, _)) => state,
-            Err(failure @ (Failure::Device(_) | Failure::Stop(_))) => return Err(failure),
-            // Too far for the motion of this step, whose halves are good by themselves.
-            Err(_) => b.clone(),
-        };
+        self.check(&x, &v, report)?;
+        let (end, _) = self.meet(t1, 0.5 * dt, x, v, Holds::default(), report)?;
         Ok((second, end, error))
+    }
+
+    /// Goes back to what contact remembered of sides.
+    fn remember_sides(&mut self, sides: Option<Sides>) {
+        if let (Some(contact), Some(sides)) = (&mut self.contact, sides) {
+            contact.responder.set_sides(sides);
+        }
     }
 }
 

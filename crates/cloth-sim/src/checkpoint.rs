@@ -1,8 +1,8 @@
 //! The whole simulation as bytes, and back to the same bits.
 //!
 //! Layout, little-endian: magic, version (u32), length of the payload (u64), payload, FNV-1a checksum of the payload (u64).
-//! Payload: scene (JSON), options, state, what bending laws remember, pending steps, the step under way, assets, report
-//! (JSON).
+//! Payload: scene (JSON), options, state, what bending laws remember, sides of near pairs, pending steps, the step under
+//! way, assets, report (JSON).
 
 use crate::auto_step::Control;
 use crate::constraints::Holds;
@@ -10,7 +10,9 @@ use crate::ledger::Ledger;
 use crate::pace::{Pace, Pending, UnderWay};
 use crate::step::State;
 use crate::{Assets, Report, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
+use cloth_collision::StencilKind;
 use cloth_core::mesh::TriMesh;
+use cloth_response::{Side, Sides};
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
@@ -49,6 +51,7 @@ impl Simulation {
         payload.f64(ledger.level);
         payload.f64(ledger.scale);
         payload.numbers(&self.memory());
+        payload.sides(self.contact.as_ref().map_or(&[], |contact| contact.responder.sides().pairs()));
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
         payload.u64(pending.steps);
         payload.f64(pending.dt);
@@ -122,6 +125,7 @@ impl Simulation {
         let ledger = Ledger { open: payload.u64()? != 0, level: payload.f64()?, scale: payload.f64()? };
         let pace = Pace { halvings: halvings as u32, good: good as u32, control, ledger };
         let memory = payload.numbers()?;
+        let sides = payload.sides()?;
         let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
         let under_way = if payload.u64()? == 0 { None } else { Some(payload.under_way(1 << most)?) };
         let assets = payload.assets()?;
@@ -135,6 +139,13 @@ impl Simulation {
         sim.integrator
             .set_memory(&memory)
             .map_err(|e| invalid("what this scene's laws remember", e.to_string()))?;
+        if let Some(contact) = &mut sim.contact {
+            let sides =
+                Sides::new(sides, &contact.mesh).map_err(|e| invalid("sides of pairs", e.to_string()))?;
+            contact.responder.set_sides(sides);
+        } else if !sides.is_empty() {
+            return Err(invalid("no sides of pairs without contact", sides.len().to_string()));
+        }
         sim.pending = (pending.steps > 0).then_some(pending);
         let past: Report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
         let here = std::mem::replace(&mut sim.report, past);
@@ -222,6 +233,15 @@ impl Writer {
         self.u64(triangles.len() as u64);
         for v in triangles.iter().flatten() {
             self.0.extend(v.to_le_bytes());
+        }
+    }
+
+    fn sides(&mut self, sides: &[Side]) {
+        self.u64(sides.len() as u64);
+        for Side { vertices, kind, positive, certain } in sides {
+            let flags = [*kind == StencilKind::EdgeEdge, *positive, *certain];
+            self.0.extend(vertices.iter().flat_map(|v| v.to_le_bytes()));
+            self.0.extend(flags.map(u8::from));
         }
     }
 
@@ -316,6 +336,18 @@ impl Reader<'_> {
         let count = self.count(12)?;
         let mut index = || Ok::<u32, SimError>(u32::from_le_bytes(self.array()?));
         (0..count).map(|_| Ok([index()?, index()?, index()?])).collect()
+    }
+
+    fn sides(&mut self) -> Result<Vec<Side>, SimError> {
+        let count = self.count(19)?;
+        let mut side = || {
+            let mut index = || Ok::<u32, SimError>(u32::from_le_bytes(self.array()?));
+            let vertices = [index()?, index()?, index()?, index()?];
+            let [is_edges, positive, certain] = self.array()?.map(|flag: u8| flag != 0);
+            let kind = if is_edges { StencilKind::EdgeEdge } else { StencilKind::VertexTriangle };
+            Ok(Side { vertices, kind, positive, certain })
+        };
+        (0..count).map(|_| side()).collect()
     }
 
     fn map<T>(

@@ -4,6 +4,8 @@ use crate::collision::mesh::Vec3;
 use crate::collision::{self, CollisionMesh, Contacts, DetectError, Query};
 use crate::scene::nearest;
 
+mod auto;
+mod choice;
 mod continuous;
 mod tuning;
 pub(crate) use continuous::Continuous;

@@ -32,6 +32,7 @@ mod motion;
 mod pace;
 mod pins;
 mod plan;
+mod precision;
 mod regions;
 mod report;
 mod restart;
@@ -45,7 +46,9 @@ pub use bodies::{BodyInfo, BodyKind};
 pub use error::SimError;
 pub use pace::Advance;
 pub use plan::{Effect, Plan};
-pub use report::{ContactReport, Detection, EffectCost, Fallback, Refused, Report, StepReport, Totals};
+pub use report::{
+    Chosen, ContactReport, Detection, EffectCost, Fallback, Refused, Report, StepReport, Totals,
+};
 pub use scene::{Scene, SceneError};
 pub use simulation::{Simulation, SimulationOptions};
 pub use untangle::Untangled;

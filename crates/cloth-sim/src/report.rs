@@ -22,6 +22,9 @@ pub struct Report {
     /// GPUs that were asked for and could not be had, or failed on the way.
     #[serde(default)]
     pub fallbacks: Vec<Fallback>,
+    /// What `contact.detector = "auto"` chose by measuring.
+    #[serde(default)]
+    pub choices: Vec<Chosen>,
     /// The first attempts at a step that were given up (at most 64; `totals.retries` counts all).
     #[serde(default)]
     pub refused: Vec<Refused>,
@@ -44,6 +47,23 @@ pub struct Refused {
     pub dt: f64,
     /// What was wrong.
     pub reason: String,
+}
+
+/// A detector that was chosen by measuring.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Chosen {
+    /// Number of the step after which it was chosen.
+    pub step: u64,
+    /// Time at the end of that step [s].
+    pub time: f64,
+    /// Name of the method.
+    pub detector: String,
+    /// `"cpu"`, or the GPU with its driver.
+    pub device: String,
+    /// Why, in words.
+    pub why: String,
+    /// Seconds of detection per step of each method that was measured.
+    pub seconds_per_step: Vec<(String, f64)>,
 }
 
 /// Who detects continuously in a simulation.
@@ -142,6 +162,12 @@ pub struct StepReport {
 pub struct ContactReport {
     /// Pairs within the thickness at the start.
     pub proximities: usize,
+    /// Those of them whose side is remembered.
+    #[serde(default)]
+    pub remembered: usize,
+    /// Pairs whose normal their remembered side decided: they touch but for rounding, or went through.
+    #[serde(default)]
+    pub by_side: usize,
     /// Continuous detections over the step.
     pub passes: usize,
     /// Pairs that collided in the first of them.
@@ -186,6 +212,8 @@ pub struct ContactReport {
 impl ContactReport {
     pub(crate) fn add(&mut self, info: &cloth_response::ResponseInfo) {
         self.proximities += info.proximities;
+        self.remembered += info.remembered;
+        self.by_side += info.by_side;
         self.passes += info.passes;
         self.collisions += info.collisions;
         self.impulses += info.impulses;
@@ -328,6 +356,7 @@ impl Report {
             threads: self.threads,
             detection: self.detection.clone(),
             fallbacks: self.fallbacks.clone(),
+            choices: self.choices.clone(),
             refused: self.refused.clone(),
             untangled: self.untangled.clone(),
         }

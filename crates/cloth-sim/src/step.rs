@@ -5,7 +5,7 @@
 
 use crate::bodies::Bodies;
 use crate::constraints::{Holds, failure};
-use crate::contact::{ContactStage, stage};
+use crate::contact::{ContactStage, seconds_of_detection, stage};
 use crate::guard::Alarm;
 use crate::pace::Pace;
 use crate::pins::PinSet;
@@ -97,9 +97,16 @@ pub(crate) struct Trial {
     dynamics: StepInfo,
     /// What response did, and the solves of contact constraints.
     contact: Option<(ResponseInfo, usize)>,
+    /// What it took [s].
+    seconds: f64,
 }
 
 impl Trial {
+    /// Seconds of continuous detection, and of all.
+    pub(crate) fn seconds(&self) -> [f64; 2] {
+        [self.contact.as_ref().map_or(0.0, |(info, _)| seconds_of_detection(info)), self.seconds]
+    }
+
     /// Adds the counts of its dynamics to the step's.
     pub(crate) fn note_work(&self, report: &mut StepReport) {
         let dynamics = &self.dynamics;
@@ -153,14 +160,17 @@ impl Simulation {
         let floor = dt <= least || 0.5 * dt < self.scene.time.dt_min;
         trial.state.pace.ledger = self.audit(&trial.state, whole, floor, report)?;
         trial.note(report);
-        self.commit(trial.state);
+        let seconds = trial.seconds();
+        self.commit(trial.state, seconds);
         Ok(())
     }
 
-    /// Writes a state that has passed every check; laws with memory move on to it.
-    pub(crate) fn commit(&mut self, state: State) {
+    /// Writes a state that has passed every check; laws with memory move on to it, and contact to the last response.
+    /// `seconds`: of continuous detection, and of all.
+    pub(crate) fn commit(&mut self, state: State, seconds: [f64; 2]) {
         self.integrator.accept();
         self.state = state;
+        self.accept_contact(seconds);
     }
 
     /// The motion over `dt` to time `t1` from the state as it is, which stays.
@@ -169,6 +179,7 @@ impl Simulation {
         if (self.fail)(self.state.time, dt) {
             return Err(Failure::Alarm(Alarm { reason: "planted".into(), vertices: vec![0] }));
         }
+        let started = Instant::now();
         let (mut x, mut v) = (self.state.x.clone(), self.state.v.clone());
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
@@ -177,7 +188,8 @@ impl Simulation {
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let (state, info) = self.meet(t1, dt, x, v, holds, report)?;
-        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)) })
+        let seconds = started.elapsed().as_secs_f64();
+        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), seconds })
     }
 
     /// The state at `t1` after response to the motion from the state as it is to `x` with end velocities `v`.

@@ -27,7 +27,7 @@ const SECONDS: f64 = 0.3;
 
 fn reference() -> Vec<Vec3> {
     let mut sim = simulation(&hanging(6, "rk4", 1e-4));
-    advance(&mut sim, SECONDS).unwrap();
+    advance(&mut sim, SECONDS).unwrap_or_else(|e| panic!("{e}"));
     sim.positions().to_vec()
 }
 
@@ -117,7 +117,7 @@ fn the_bits_do_not_depend_on_threads_or_interruptions() {
     let text = auto(&drape(9), 2e-3);
     let run = |threads: usize| {
         let mut sim = build(&scene(&text), threads);
-        advance(&mut sim, 0.4).unwrap();
+        advance(&mut sim, 0.4).unwrap_or_else(|e| panic!("{e}"));
         sim
     };
     let straight = run(1);

@@ -195,6 +195,45 @@ fn a_gpu_whose_arrays_are_too_small_is_refused_or_done_without() {
     assert!(fallback.step <= 1 && fallback.reason.contains("the device binds 16"), "{fallback}");
 }
 
+/// Among the CPU's and the GPU's methods the measured one changes, and the bits do not; a GPU that is lost is no candidate any more.
+#[test]
+fn auto_measures_methods_of_both_devices() {
+    let Some(_turn) = gpu() else { return };
+    let mut sim = build("auto", Device::Auto, &SHARED).unwrap();
+    let mut expected = build("bvh", Device::Cpu, &SHARED).unwrap();
+    let why = sim.plan().detection.clone().unwrap().why;
+    assert!(why.contains("measured against \"octree\", \"bvh\", \"session\""), "{why}");
+    while sim.report().choices.is_empty() && sim.step_count() < 120 {
+        sim.step().unwrap();
+        expected.step().unwrap();
+        assert_eq!(bits(&sim), bits(&expected));
+    }
+    let choice = &sim.report().choices[0];
+    let mut measured: Vec<&str> = choice.seconds_per_step.iter().map(|(name, _)| name.as_str()).collect();
+    measured.sort_unstable();
+    assert_eq!(measured, ["bvh", "octree", "session", "virtual-subdivision"]);
+    assert_eq!(detection(&sim), (choice.detector.clone(), choice.device.clone()));
+    let least = choice.seconds_per_step.iter().map(|(_, s)| *s).fold(f64::INFINITY, f64::min);
+    let own = choice.seconds_per_step.iter().find(|(name, _)| *name == choice.detector).unwrap().1;
+    assert!(own <= least / 0.9, "{choice:?}");
+
+    // A software adapter that the device asks for by its name is alone.
+    if SHARED.gpu().is_some_and(|gpu| gpu.is_software()) {
+        let alone = build("auto", Device::Gpu, &SHARED).unwrap();
+        assert_eq!(alone.plan().detection.clone().unwrap().why, "device \"gpu\"");
+    }
+
+    // Lost while it is measured.
+    let mut sim = build("auto", Device::Auto, &SHARED).unwrap();
+    for _ in 0..10 {
+        sim.step().unwrap();
+    }
+    let lost = SHARED.lose();
+    let sim = run(sim);
+    assert!(lost && bits(&sim) == bits(&on_cpu()));
+    assert_eq!((detection(&sim).1.as_str(), sim.report().fallbacks.len()), ("cpu", 1));
+}
+
 #[test]
 fn devices_and_detectors_that_do_not_go_together_are_refused() {
     for (detector, device) in [("grid", Device::Cpu), ("bvh", Device::Gpu), ("brute", Device::Gpu)] {
@@ -206,7 +245,8 @@ fn devices_and_detectors_that_do_not_go_together_are_refused() {
     let detection =
         |detector, device| build(detector, device, &SHARED).unwrap().report().detection.clone().unwrap();
     let auto = detection("auto", Device::Cpu);
-    assert_eq!((auto.detector.as_str(), auto.why.as_str()), ("bvh", "device \"cpu\""));
+    let why = "device \"cpu\"; measured against \"session\" where detection takes 5 % of a step";
+    assert_eq!((auto.detector.as_str(), auto.why.as_str()), ("bvh", why));
     let named = detection("brute", Device::Auto);
     assert_eq!((named.detector.as_str(), named.why.as_str()), ("brute", "contact.detector = \"brute\""));
 }

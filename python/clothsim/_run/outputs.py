@@ -133,6 +133,7 @@ class Outputs:
             "threads": summary["threads"],
             "detection": summary["detection"],
             "fallbacks": summary["fallbacks"],
+            "choices": summary["choices"],
             "scene_digest": self._scene_digest,
             "error": None if self._error is None else f"{type(self._error).__name__}: {self._error}",
             "simulated_seconds": self._simulation.time,

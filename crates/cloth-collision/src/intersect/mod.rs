@@ -77,14 +77,14 @@ pub(crate) fn segment_meets_triangle(segment: &[Vec3; 2], triangle: &[Vec3; 3]) 
 fn heights<const N: usize>(triangle: &[Vec3; 3], points: &[Vec3; N]) -> [f64; N] {
     let mut heights = [0.0; N];
     for (height, p) in heights.iter_mut().zip(points) {
-        *height = side(&triangle[0], &triangle[1], &triangle[2], p);
+        *height = height_of(&triangle[0], &triangle[1], &triangle[2], p);
     }
     heights
 }
 
 /// A number of the exact sign of det(a−d, b−d, c−d).
 #[inline]
-fn side(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
+pub(crate) fn height_of(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
     // Shewchuk's static filter, here to be inlined: the constant is his o3derrboundA for u = 2⁻⁵³.
     const BOUND: f64 = (7.0 + 56.0 * (0.5 * f64::EPSILON)) * (0.5 * f64::EPSILON);
     let (a0, b0, c0) = (a - d, b - d, c - d);
@@ -114,7 +114,7 @@ fn side_meets(segment: &[Vec3; 2], heights: [f64; 2], triangle: &[Vec3; 3]) -> b
         return meets_in_plane(segment, triangle);
     }
     let ([p, q], [a, b, c]) = (segment, triangle);
-    let turns = [side(p, q, a, b), side(p, q, b, c), side(p, q, c, a)];
+    let turns = [height_of(p, q, a, b), height_of(p, q, b, c), height_of(p, q, c, a)];
     turns.iter().all(|&t| t >= 0.0) || turns.iter().all(|&t| t <= 0.0)
 }
 

@@ -236,6 +236,12 @@ impl Detector for SkippingSession {
         "session"
     }
 
+    fn host_bytes(&self) -> usize {
+        let lists = size_of_val(&self.triangles[..]) + size_of_val(&self.vertex_body[..]);
+        let pairs = if self.running.is_some() { self.stats.pair_bytes as usize } else { 0 };
+        self.bvh.bytes() + lists + pairs
+    }
+
     fn detect(
         &mut self,
         mesh: &CollisionMesh,

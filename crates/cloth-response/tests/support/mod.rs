@@ -175,6 +175,7 @@ impl World {
                 assert_eq!(x_t1[i], before.0[i], "prescribed vertex {i} was moved");
             }
         }
+        self.responder.accept();
         self.v = v;
         self.time += dt;
         Ok(Step { info, x_t0: std::mem::replace(&mut self.x, x_t1) })

@@ -3,8 +3,8 @@
 use super::{BAND, ConstraintStage};
 use crate::Vec3;
 use cloth_collision::mesh::NONE;
-use cloth_collision::{CollisionMesh, Nearest};
-use cloth_response::FrictionLaw;
+use cloth_collision::{CollisionMesh, Nearest, Stencil, StencilKind, plane, side};
+use cloth_response::{FrictionLaw, Side, Sides};
 use nalgebra::Matrix3;
 
 /// The part of the overlap that one step undoes, that of the velocity filter.
@@ -32,6 +32,8 @@ pub(super) struct Motion<'a> {
     pub(super) cloth: &'a [Vec3],
     /// Colliders at the start and at the end [m].
     pub(super) colliders: [&'a [Vec3]; 2],
+    /// What is remembered of near pairs.
+    pub(super) sides: &'a Sides,
     pub(super) dt: f64,
 }
 
@@ -68,15 +70,32 @@ pub(super) struct Contact {
 }
 
 impl Contact {
-    /// The contact of a vertex with the surface around `triangle`, found at the start of the step. `None` without a distance.
+    /// The contact of a vertex with the surface around `triangle`, found at the start of the step. `None` without a distance, and
+    /// for a vertex on the wrong side, which the velocity filter brings back.
     pub(super) fn new(motion: &Motion<'_>, vertex: u32, triangle: u32) -> Option<Self> {
         let x = motion.cloth[vertex as usize];
-        let start = motion.nearest(0, triangle, &x);
+        let mut start = motion.nearest(0, triangle, &x);
         let gap_t0 = start.r.norm();
-        if gap_t0 <= 0.0 {
+        let corners = [0, 1].map(|end| motion.corners(end, start.triangle));
+        let (kind, [a, b, c]) = (StencilKind::VertexTriangle, motion.mesh.triangles[start.triangle as usize]);
+        let p = [x, corners[0][0], corners[0][1], corners[0][2]];
+        let here = side(kind, &p);
+        let known = motion.sides.get(kind, [vertex, a, b, c]);
+        if gap_t0 <= 0.0 || known.is_some_and(|k| !k.certain && k.sign() * here < 0) {
             return None;
         }
-        let corners = [0, 1].map(|end| motion.corners(end, start.triangle));
+        let stencil = Stencil {
+            kind,
+            vertices: [vertex, a, b, c],
+            weights: [1.0, -start.weights[0], -start.weights[1], -start.weights[2]],
+            normal: start.r,
+            distance: gap_t0,
+        };
+        if !stencil.has_direction(&p) {
+            // Rounding has no direction: the plane's, to the side where the vertex is.
+            let sign = if here == 0 { known.map_or(0, Side::sign) } else { here };
+            start.r = plane(kind, &p)? * (f64::from(sign) * gap_t0);
+        }
         let (ride, r) = if corners[0] == corners[1] {
             (Vec3::zeros(), start.r)
         } else {

@@ -15,6 +15,7 @@ use super::contact::{Contact, Motion};
 use super::friction::{Load, Push, kinetic, sticking};
 use crate::Vec3;
 use cloth_core::{ActiveSet, Constraint};
+use cloth_response::Sides;
 use nalgebra::Matrix3;
 use std::time::{Duration, Instant};
 
@@ -101,7 +102,7 @@ pub(crate) struct Sites<'a> {
 
 impl<'a> Sites<'a> {
     /// `near`: [`ConstraintStage::near`] at the start. `x_t0` [m], `v_t0` [m/s]: all vertices at the start; `colliders_t1`
-    /// [m]: those of colliders at the end. `before`: what the last step's constraints did.
+    /// [m]: those of colliders at the end. `before`: what the last step's constraints did. `sides`: what is remembered of near pairs.
     pub(crate) fn new(
         stage: &'a ConstraintStage,
         mesh: &'a cloth_collision::CollisionMesh,
@@ -111,10 +112,11 @@ impl<'a> Sites<'a> {
         colliders_t1: &'a [Vec3],
         masses: &[f64],
         before: &Holds,
+        sides: &'a Sides,
         settings: Settings,
     ) -> Self {
         let (cloth, start) = x_t0.split_at(masses.len());
-        let motion = Motion { stage, mesh, cloth, colliders: [start, colliders_t1], dt: settings.dt };
+        let motion = Motion { stage, mesh, cloth, colliders: [start, colliders_t1], sides, dt: settings.dt };
         let mut sites = Vec::new();
         for of_vertex in near.chunk_by(|a, b| a[0] == b[0]) {
             let vertex = of_vertex[0][0];

@@ -27,7 +27,9 @@ impl Simulation {
         report: &mut StepReport,
     ) -> Result<Option<(StepInfo, Holds, usize)>, Failure> {
         let Self { contact, integrator, state, pins, inv_mass, pool, scene, .. } = self;
-        let Some(ContactStage { mesh, bvh, constraints: Some(own), .. }) = contact else { return Ok(None) };
+        let Some(ContactStage { mesh, bvh, constraints: Some(own), responder, .. }) = contact else {
+            return Ok(None);
+        };
         let clock = Instant::now();
         let masses = integrator.system().masses();
         let cloth = masses.len();
@@ -40,8 +42,19 @@ impl Simulation {
             .map_err(|e| Failure::Stop(stage("contact constraints", &e)))?;
         let (cloth_x, colliders) = x.split_at_mut(cloth);
         let settings = Settings { dt, gravity };
-        let mut sites =
-            Sites::new(own, mesh, &near, &state.x, &state.v, colliders, masses, &state.holds, settings);
+        let sides = responder.sides();
+        let mut sites = Sites::new(
+            own,
+            mesh,
+            &near,
+            &state.x,
+            &state.v,
+            colliders,
+            masses,
+            &state.holds,
+            sides,
+            settings,
+        );
         let mut expected = state.contact_force.clone();
         if !expected.is_empty() {
             for (vertex, normal) in sites.held() {

@@ -22,6 +22,11 @@ impl SharedGpu {
     pub fn set_takes_software(&self, _takes: bool) {}
 
     /// None is open.
+    pub(super) fn is_hardware(&self) -> bool {
+        false
+    }
+
+    /// None is open.
     pub fn lose(&self) -> bool {
         false
     }

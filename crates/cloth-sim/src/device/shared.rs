@@ -72,6 +72,11 @@ impl SharedGpu {
         self.lock().open.as_ref().map(|open| open.gpu.clone())
     }
 
+    /// Whether a GPU is open that is no software adapter.
+    pub(super) fn is_hardware(&self) -> bool {
+        self.gpu().is_some_and(|gpu| !gpu.is_software())
+    }
+
     /// Closes the GPU under whoever works with it, as if its driver had gone; whether one was open. For tests.
     pub fn lose(&self) -> bool {
         self.gpu().map(|gpu| gpu.close()).is_some()

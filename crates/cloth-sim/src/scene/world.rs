@@ -134,9 +134,9 @@ pub struct Contact {
     pub method: ContactMethod,
     /// Distance at which surfaces rest on each other [m], > 0.
     pub thickness: f64,
-    /// Continuous detection: "auto" ("bvh" on the CPU, "virtual-subdivision" on a GPU), "bvh", "session" (skips tree updates in
-    /// coherent motion) or "brute" (every pair, the oracle) on the CPU, "grid", "virtual-subdivision", "octree-single" or
-    /// "octree" on a GPU. Results do not depend on it.
+    /// Continuous detection: "auto" (the cheapest of those that the device has, measured during the run; named in plan and
+    /// report), "bvh", "session" (skips tree updates in coherent motion) or "brute" (every pair, the oracle) on the CPU, "grid",
+    /// "virtual-subdivision", "octree-single" or "octree" on a GPU. Results do not depend on it.
     pub detector: String,
     /// Whether cloth meets itself; a piece of cloth may opt out with its own `self_collision`.
     #[serde(rename = "self")]
