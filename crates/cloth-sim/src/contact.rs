@@ -219,7 +219,10 @@ shape = {{ type = "plane", half_size = 1.0 }}
         assert!(retried.attempt(0.052, 0.004, [0.004, 0.0], &mut crate::StepReport::default()).is_err());
         assert_eq!(sides(&retried), &before);
         retried.state.v[7].x = 0.0;
-        retried.step().unwrap();
+        // The steps are reduced still: sides change over a few of them.
+        for _ in 0..10 {
+            retried.step().unwrap();
+        }
         assert_ne!(sides(&retried), &before, "the comparison sees a step");
     }
 
