@@ -9,6 +9,7 @@ mod collisions;
 mod error;
 mod frames;
 mod friction;
+mod gaps;
 mod hold;
 mod impulse;
 mod info;
@@ -17,6 +18,7 @@ mod motion;
 mod params;
 mod repulsion;
 mod respond;
+mod resting;
 mod rigid_motion;
 mod stages;
 mod strain;
@@ -29,6 +31,7 @@ pub use friction::rule::FrictionRule;
 pub use info::ResponseInfo;
 pub use params::ResponseParams;
 pub use respond::Responder;
+pub use resting::Resting;
 pub use strain::{LimitedEdge, StrainLimit};
 
 /// A point [m], velocity [m/s] or impulse [N s] in space.

@@ -24,6 +24,7 @@ mod bodies;
 mod checkpoint;
 mod constraints;
 mod contact;
+mod cost;
 mod error;
 mod guard;
 mod motion;
@@ -31,6 +32,7 @@ mod pins;
 mod plan;
 mod report;
 mod simulation;
+mod sleep;
 mod step;
 
 pub use assets::{Assets, Sequence};

@@ -5,6 +5,7 @@
 //! [`narrow`] decides what they yield while it streams by.
 
 pub(crate) mod build;
+mod flatness;
 mod intersections;
 pub(crate) mod leaf_pair;
 pub(crate) mod narrow;
@@ -17,6 +18,7 @@ use crate::bounds::{LANES, MovingBox, middle};
 use crate::contact::check_positions;
 use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use build::Tree;
+use flatness::Flatness;
 use refit::Boxes;
 use std::time::Instant;
 use traverse::{Streaming, traverse};
@@ -34,6 +36,7 @@ pub struct Bvh {
     pub(crate) tree: Tree,
     pub(crate) moving: Boxes<2>,
     pub(crate) still: Boxes<1>,
+    flatness: Option<Flatness>,
 }
 
 impl Bvh {
@@ -65,6 +68,7 @@ impl Bvh {
             tree: build::build(mesh, x, pool),
             moving: Boxes::default(),
             still: Boxes::default(),
+            flatness: None,
         })
     }
 
@@ -73,6 +77,18 @@ impl Bvh {
         self.tree.bytes()
             + Boxes::<2>::bytes(&self.tree, self.vertex_count)
             + Boxes::<1>::bytes(&self.tree, self.vertex_count)
+            + self.flatness.as_ref().map_or(0, Flatness::bytes)
+    }
+
+    /// Whether [`Bvh::proximity`] passes over surfaces that certainly do not meet themselves: normals in a cone and a contour that
+    /// does not come near itself prove it. Costs a pass over the triangles; no answer depends on it.
+    pub fn prove_flatness(&mut self, on: bool) {
+        self.flatness = on.then(Flatness::default);
+    }
+
+    /// Triangles of surfaces that the last [`Bvh::proximity`] did not search against themselves.
+    pub fn flat_triangles(&self) -> u64 {
+        self.flatness.as_ref().map_or(0, |f| f.found.triangles)
     }
 
     pub(crate) fn check_mesh(&self, mesh: &CollisionMesh) -> Result<(), DetectError> {

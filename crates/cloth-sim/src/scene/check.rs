@@ -35,6 +35,7 @@ impl Scene {
         self.positive("output.fps", self.output.fps, "1/s")?;
         self.not_negative("output.checkpoint_interval", self.output.checkpoint_interval, "s")?;
         self.check_contact()?;
+        self.check_effects()?;
         self.check_names()?;
         self.check_all_friction()?;
         self.check_strain_limits()?;
@@ -63,6 +64,17 @@ impl Scene {
             return Err(self
                 .error("contact.detector", format!("one of {detectors:?}"), got)
                 .with_nearest(&contact.detector, detectors.into_iter()));
+        }
+        Ok(())
+    }
+
+    fn check_effects(&self) -> Result<(), SceneError> {
+        let Some(sleep) = &self.effects.sleep else { return Ok(()) };
+        self.positive("effects.sleep.speed", sleep.speed, "m/s")?;
+        self.positive("effects.sleep.time", sleep.time, "s")?;
+        if self.contact.as_ref().is_some_and(|c| c.method == ContactMethod::Constraints) {
+            let got = "effects.sleep with contact.method = \"constraints\"";
+            return Err(self.error("effects.sleep", "contact.method = \"velocity-filter\"", got));
         }
         Ok(())
     }
