@@ -143,6 +143,11 @@ def test_a_stuck_run_and_a_refused_start() -> None:
     assert judged.verdict is Verdict.REFUSED and judged.why.startswith("IntersectingStart: ")
 
 
+@pytest.mark.parametrize(("case", "value"), [("fast-sphere", 0.0), ("slivers", 0.0), ("scale", -1.0), ("stack", 0.0)])
+def test_values_that_make_no_scene_are_refused(case: str, value: float) -> None:
+    assert judge(run_cell({"case": case, "x": 5e-3, "y": value, "fixed": {}})[0]).verdict is Verdict.REFUSED
+
+
 def test_a_cell_has_a_time_limit(tmp_path: Any) -> None:
     atlas = cs.stability.run(["stretch"], at={"dt": [1e-7], "stiffness": [1.0]}, limit=0.5, progress=False)
     assert [c.judged.verdict for c in atlas.cells] == [Verdict.UNKNOWN]

@@ -54,7 +54,7 @@ def execute(options: argparse.Namespace) -> int:
     """List, or run and say what came of it; 1 if a promise was broken."""
     from clothsim.errors import InvalidInput
     from clothsim.stability import job, outputs
-    from clothsim.stability.atlas import Request, parse_values
+    from clothsim.stability.atlas import Request, values_by_name
     from clothsim.stability.catalogue import CATALOGUE
 
     if options.list:
@@ -66,7 +66,7 @@ def execute(options: argparse.Namespace) -> int:
     request = Request(
         options.cases,
         quick=options.quick,
-        at=dict(parse_values(text) for text in options.at),
+        at=values_by_name(options.at),
         fixed=fixed_values(options.fixed),
     )
     again = _command(options)

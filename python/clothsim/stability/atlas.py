@@ -18,7 +18,7 @@ from clothsim.stability.catalogue import CATALOGUE, find
 from clothsim.stability.verdict import Judged, Verdict, judge
 from clothsim.study.folder import fingerprint
 
-__all__ = ["Atlas", "Cell", "Map", "Request", "parse_values", "value_text"]
+__all__ = ["Atlas", "Cell", "Map", "Request", "parse_values", "value_text", "values_by_name"]
 
 
 @dataclass(frozen=True)
@@ -220,6 +220,22 @@ def parse_values(text: str) -> tuple[str, list[Any]]:
         expected = "NAME=VALUE, several by commas"
         raise InvalidInput(f"--at: expected {expected}, got {text!r}", name="at", expected=expected, got=text)
     return name.strip(), [_value(part) for part in found]
+
+
+def values_by_name(texts: Sequence[str]) -> dict[str, list[Any]]:
+    """Several of `parse_values`.
+
+    Raises
+    ------
+    InvalidInput
+        A name comes twice.
+    """
+    out: dict[str, list[Any]] = {}
+    for name, values in map(parse_values, texts):
+        if name in out:
+            raise InvalidInput(f"--at {name}: expected it once, several values by commas, got it twice", name="at")
+        out[name] = values
+    return out
 
 
 def _value(text: str) -> Any:

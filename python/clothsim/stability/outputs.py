@@ -21,7 +21,7 @@ FILES = ("stability.json", "stability.csv", "README.md", "overview.png", "overvi
 
 _COLUMNS = (
     "verdict", "promised", "why", "time", "steps", "substeps", "retries", "growth", "growth_left", "intersections",
-    "passed", "not_converged", "zones", "held_vertices", "seconds",
+    "passed", "not_converged", "zones", "held_vertices", "cpu_seconds",
 )  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def write(atlas: Atlas, out: Path) -> None:
     for suffix, content in zip((".png", ".svg"), maps.overview(atlas), strict=True):
         write_whole(out / ("overview" + suffix), content)
     write_whole(out / "stability.csv", csv_text(atlas).encode())
-    write_whole(out / "README.md", markdown(atlas).encode())
+    write_whole(out / "README.md", markdown(atlas, out).encode())
     write_whole(out / FACTS, json.dumps(atlas.facts(), indent=1, allow_nan=True).encode())
 
 
@@ -55,15 +55,17 @@ def csv_text(atlas: Atlas) -> str:
     return text.getvalue()
 
 
-def markdown(atlas: Atlas) -> str:
+def markdown(atlas: Atlas, out: Path) -> str:
     """The page of the atlas: one row per case."""
+    beside = (out.resolve().parent / "docs" / "stability.md").exists()
+    docs = "[docs/stability.md](../docs/stability.md)" if beside else "docs/stability.md"
     present = [v for v in Verdict if any(v in own.counts() for own in atlas.maps)]
     where = atlas.machine
     lines = [
         "# The stability atlas",
         "",
         f"Written by the command below on {where['processor']}, {where['cores']} cores, in {atlas.seconds:.0f} s.",
-        "What the verdicts mean and how to read a map: [docs/stability.md](../docs/stability.md). Every cell is a row",
+        f"What the verdicts mean and how to read a map: {docs}. Every cell is a row",
         "of [stability.csv](stability.csv).",
         "",
         "```sh",

@@ -27,6 +27,8 @@ def run_cell(job: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
             setup = replace(setup, scene=_with(setup.scene, job["fixed"]))
     except ClothSimError as error:
         return {"error": str(error), "error_type": type(error).__name__, "time": 0.0}, {}
+    except (ArithmeticError, TypeError, ValueError) as error:  # a value of --at that makes no scene
+        return {"error": f"no scene with these values: {error}", "error_type": "InvalidInput", "time": 0.0}, {}
     return observe(setup), {}
 
 

@@ -47,9 +47,7 @@ def _touching(gap: float, kind: str) -> Setup:
     }
     second = kinds[kind]
     if kind == "corner on face":
-        # Upright and on its corner: the turn about x after one about y, as one.
-        third = 3.0**-0.5
-        second["rotation"] = {"axis": [third, third, -third], "angle": 2.0943951023931953}
+        second["rotation"] = {"axis": [0, 0, 1], "angle": -1.5707963267948966}  # upright, its first vertex down
         second["mesh"] = {"generator": "disc", "radius": diagonal, "rings": 3}
     return Setup(_pair(5e-3, second))
 
