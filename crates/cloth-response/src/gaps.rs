@@ -17,7 +17,7 @@
 //! A near pair stands for all pairs with the same closest points (see [`cloth_collision::Bvh::proximity`]); their features share
 //! triangles with the pair's, so g is handed on within each triangle. Two edges whose nearest points are an end and a point of a
 //! border of the end's own triangle are no near pair: the least height of each triangle counts as a distance within its body. A
-//! triangle with an attached vertex has gap 0: its pairs may be no near pairs while those of its edges would be.
+//! triangle with an attached or sewn vertex has gap 0: its pairs may be no near pairs while those of its edges would be.
 
 use crate::Vec3;
 use crate::motion::{Motion, bytes_of};
@@ -173,7 +173,11 @@ impl Gaps {
             let attached = t.iter().any(|&v| mesh.attached_to[v as usize] != NONE);
             let height =
                 if within[t[0] as usize] < f64::INFINITY { least_height(t, x) } else { f64::INFINITY };
+            let sewn = t.iter().any(|&v| mesh.sewn.get(v as usize).is_some_and(|group| *group != NONE));
             for &v in t {
+                if sewn {
+                    (between[v as usize], within[v as usize]) = (0.0, 0.0);
+                }
                 if height < within[v as usize] {
                     within[v as usize] = height;
                 }

@@ -34,6 +34,11 @@ pub(crate) struct State {
 impl State {
     /// Cloth as placed, colliders at t = 0.
     pub(crate) fn start(bodies: &Bodies) -> Self {
+        Self::start_at(bodies, 0.0)
+    }
+
+    /// Cloth as placed, colliders where they are at `time` \[s\].
+    pub(crate) fn start_at(bodies: &Bodies, time: f64) -> Self {
         let mut x = Vec::with_capacity(bodies.vertices);
         let mut v = Vec::with_capacity(bodies.vertices);
         for body in &bodies.cloth {
@@ -44,10 +49,10 @@ impl State {
         v.resize(bodies.vertices, Vec3::zeros());
         for body in &bodies.colliders {
             let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
-            body.motion.write(0.0, &mut x[range]);
+            body.motion.write(time, &mut x[range]);
         }
         Self {
-            time: 0.0,
+            time,
             step: 0,
             x,
             v,
@@ -60,7 +65,7 @@ impl State {
     /// Moves pinned vertices to where their motion starts, at rest.
     pub(crate) fn place_pins(&mut self, bodies: &Bodies, pins: &PinSet) {
         let mut targets = vec![Vec3::zeros(); pins.vertices.len()];
-        pins.write(bodies, 0.0, &self.x, &mut targets);
+        pins.write(bodies, self.time, &self.x, &mut targets);
         for (&v, target) in pins.vertices.iter().zip(targets) {
             self.x[v as usize] = target;
             self.v[v as usize] = Vec3::zeros();
@@ -160,6 +165,7 @@ impl Simulation {
         self.move_colliders(t1, dt, &mut x, &mut v, report);
         let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
         self.mark_moving(dt, &x, &pin_x)?;
+        self.integrator.set_time(t1);
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let v_free = self.contact.is_some().then(|| v.clone());

@@ -4,11 +4,13 @@
 
 mod bounds;
 mod check;
+mod check_garment;
 mod cloth;
 mod collider;
 mod effects;
 mod file;
 mod friction;
+mod garment;
 mod motion;
 mod output;
 mod schema;
@@ -23,6 +25,7 @@ pub use collider::{Collider, SequenceSource, ShapeSource};
 pub use effects::{Choice, Effects, Sleep};
 pub use file::FileReference;
 pub use friction::{Friction, PairFriction, StrainLimitSource, StrainLimitTable};
+pub use garment::{Region, Seam};
 pub use motion::{Keyframe, Rotation};
 pub use output::Output;
 pub use source::{SceneError, nearest};

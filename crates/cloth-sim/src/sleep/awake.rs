@@ -158,6 +158,7 @@ impl Simulation {
                 rest: &body.rest,
                 material: &body.material,
                 first_vertex: vertices.len(),
+                triangles: None,
             });
             vertices.extend(body.first_vertex..body.first_vertex + body.x.len());
         }
