@@ -12,7 +12,7 @@ use cloth_core::mesh::TriMesh;
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
