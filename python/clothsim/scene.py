@@ -44,7 +44,7 @@ class Scene:
         The axis that points up; the default gravity follows it.
     gravity : (3,) array, optional
         Acceleration [m/s²]; 9.81 m/s² against ``up`` by default.
-    time, solver, air, contact, output : mapping, optional
+    time, solver, air, contact, effects, output : mapping, optional
         Tables of a scene file. Without ``contact`` nothing touches anything. `set_friction` adds friction of two
         bodies, once they are there.
     cloth, collider : sequence of mappings
@@ -76,6 +76,7 @@ class Scene:
         solver: Mapping[str, Any] | None = None,
         air: Mapping[str, Any] | None = None,
         contact: Mapping[str, Any] | None = None,
+        effects: Mapping[str, Any] | None = None,
         cloth: Sequence[Mapping[str, Any]] = (),
         collider: Sequence[Mapping[str, Any]] = (),
         output: Mapping[str, Any] | None = None,
@@ -87,7 +88,8 @@ class Scene:
         self.folder: Path | None = None
         tables = {
             "name": name, "up": up, "gravity": None if gravity is None else np.asarray(gravity), "duration": duration,
-            "time": time, "solver": solver, "air": air, "contact": contact, "output": output,
+            "time": time, "solver": solver, "air": air, "contact": contact, "effects": effects,
+            "output": output,
         }  # fmt: skip
         self._data: dict[str, Any] = plain(tables, "")
         for key, tables_of in (("cloth", cloth), ("collider", collider)):

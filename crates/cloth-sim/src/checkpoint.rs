@@ -1,10 +1,12 @@
 //! The whole simulation as bytes, and back to the same bits.
 //!
 //! Layout, little-endian: magic, version (u32), length of the payload (u64), payload, FNV-1a checksum of the payload (u64).
-//! Payload: scene (JSON), options, state, what bending laws remember, sides of near pairs, pending steps, assets, report (JSON).
+//! Payload: scene (JSON), options, state, what sleeps, what bending laws remember, sides of near pairs, pending steps, assets,
+//! report (JSON).
 
 use crate::constraints::Holds;
 use crate::simulation::Pending;
+use crate::sleep::Rest;
 use crate::step::State;
 use crate::{Assets, Report, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
 use cloth_collision::StencilKind;
@@ -13,7 +15,7 @@ use cloth_response::{Side, Sides};
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
@@ -39,6 +41,8 @@ impl Simulation {
         payload.points(&self.state.holds.force);
         payload
             .numbers(&self.state.holds.sliding.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<_>>());
+        payload.numbers(&self.state.rest.asleep.iter().map(|a| f64::from(u8::from(*a))).collect::<Vec<_>>());
+        payload.numbers(&self.state.rest.calm);
         payload.numbers(&self.memory());
         payload.sides(self.contact.as_ref().map_or(&[], |contact| contact.responder.sides().pairs()));
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
@@ -96,6 +100,15 @@ impl Simulation {
         }
         let sliding = sliding.into_iter().map(|s| s != 0.0).collect();
         let holds = Holds { force, sliding };
+        let rest = Rest {
+            asleep: payload.numbers()?.into_iter().map(|a| a != 0.0).collect(),
+            calm: payload.numbers()?,
+        };
+        let sleepers = if scene.effects.sleep.is_some() { scene.cloth.len() } else { 0 };
+        if [rest.asleep.len(), rest.calm.len()] != [sleepers; 2] {
+            let got = format!("{} and {}", rest.asleep.len(), rest.calm.len());
+            return Err(invalid(format!("{sleepers} states of sleep, and times"), got));
+        }
         let memory = payload.numbers()?;
         let sides = payload.sides()?;
         let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
@@ -104,8 +117,12 @@ impl Simulation {
         if !payload.0.is_empty() {
             return Err(invalid("the end of the payload", format!("{} more bytes", payload.0.len())));
         }
-        let mut sim =
-            Self::build(&scene, assets, options, Some(State { time, step, x, v, contact_force, holds }))?;
+        let mut sim = Self::build(
+            &scene,
+            assets,
+            options,
+            Some(State { time, step, x, v, contact_force, holds, rest }),
+        )?;
         sim.integrator
             .set_memory(&memory)
             .map_err(|e| invalid("what this scene's laws remember", e.to_string()))?;
@@ -116,6 +133,7 @@ impl Simulation {
         } else if !sides.is_empty() {
             return Err(invalid("no sides of pairs without contact", sides.len().to_string()));
         }
+        sim.rebuild_awake()?;
         sim.pending = (pending.steps > 0).then_some(pending);
         let past: Report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
         let here = std::mem::replace(&mut sim.report, past);

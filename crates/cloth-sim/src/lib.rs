@@ -24,6 +24,7 @@ mod bodies;
 mod checkpoint;
 mod constraints;
 mod contact;
+mod cost;
 mod error;
 mod guard;
 mod motion;
@@ -35,6 +36,7 @@ mod report;
 mod restart;
 mod seams;
 mod simulation;
+mod sleep;
 mod step;
 
 pub use assets::{Assets, Sequence};

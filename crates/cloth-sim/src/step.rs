@@ -9,10 +9,11 @@ use crate::contact::{ContactStage, seconds_of_detection, stage};
 use crate::guard::Alarm;
 use crate::pins::PinSet;
 use crate::report::add_seconds;
+use crate::sleep::Rest;
 use crate::{SimError, Simulation, StepReport, Vec3};
 use cloth_collision::DetectError;
 use cloth_core::{Pins, StepInfo};
-use cloth_response::{ResponseError, ResponseInfo};
+use cloth_response::{ResponseError, ResponseInfo, Resting};
 use std::time::Instant;
 
 /// The state that a checkpoint holds.
@@ -26,6 +27,8 @@ pub(crate) struct State {
     pub(crate) contact_force: Vec<Vec3>,
     /// What contact constraints did in the last step; empty in a scene without.
     pub(crate) holds: Holds,
+    /// What sleeps; empty in a scene where nothing may.
+    pub(crate) rest: Rest,
 }
 
 impl State {
@@ -48,7 +51,15 @@ impl State {
             let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
             body.motion.write(time, &mut x[range]);
         }
-        Self { time, step: 0, x, v, contact_force: Vec::new(), holds: Holds::default() }
+        Self {
+            time,
+            step: 0,
+            x,
+            v,
+            contact_force: Vec::new(),
+            holds: Holds::default(),
+            rest: Rest::default(),
+        }
     }
 
     /// Moves pinned vertices to where their motion starts, at rest.
@@ -71,6 +82,8 @@ pub(crate) enum Failure {
     },
     /// The GPU gave no answer, for this reason.
     Device(String),
+    /// Sleeping cloth with these vertices is to wake.
+    Wake(Vec<u32>),
     /// Not a matter of the step's size.
     Stop(SimError),
 }
@@ -85,6 +98,10 @@ impl Simulation {
         let fraction = |units: u64| units as f64 / whole as f64;
         let mut report = StepReport { dt, converged: true, ..StepReport::default() };
         let (mut done, mut size) = (0, whole);
+        if self.all_rests(end) {
+            self.sleep_through(end, &mut report);
+            done = whole;
+        }
         while done < whole {
             let t1 = if done + size == whole { end } else { t0 + dt * fraction(done + size) };
             match self.attempt(t1, dt * fraction(size), &mut report) {
@@ -94,6 +111,7 @@ impl Simulation {
                 }
                 Err(Failure::Stop(error)) => return Err(error),
                 Err(Failure::Device(reason)) => self.lose_device(&reason)?,
+                Err(Failure::Wake(vertices)) => self.wake(&vertices)?,
                 Err(_) if size > 1 => {
                     size /= 2;
                     report.retries += 1;
@@ -106,6 +124,8 @@ impl Simulation {
                 }
             }
         }
+        self.fall_asleep(dt)?;
+        report.asleep = self.state.rest.sleepers();
         self.state.step += 1;
         report.step = self.state.step;
         report.time = self.state.time;
@@ -118,6 +138,9 @@ impl Simulation {
         if let Some(contact) = &self.contact {
             self.report.grow("contact", contact.bytes());
             self.report.grow_on_device(contact.continuous.device_bytes());
+        }
+        if let Some(sleeper) = &self.sleeper {
+            self.report.grow("sleep", sleeper.bytes());
         }
         Ok(())
     }
@@ -142,6 +165,7 @@ impl Simulation {
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
         let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
+        self.mark_moving(dt, &x, &pin_x)?;
         self.integrator.set_time(t1);
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
@@ -164,12 +188,15 @@ impl Simulation {
                 if self.inv_mass[i] > 0.0 {
                     (v[i] - v_free[i]) / (dt * self.inv_mass[i])
                 } else {
-                    Vec3::zeros()
+                    self.resting_force(i)
                 }
             };
             self.state.contact_force = (0..v.len()).map(force).collect();
         }
-        self.integrator.accept();
+        match self.sleeper.as_mut().and_then(|s| s.awake.as_mut()) {
+            None => self.integrator.accept(),
+            Some(awake) => awake.accept(),
+        }
         self.state.holds = holds;
         self.state.x = x;
         self.state.v = v;
@@ -215,7 +242,10 @@ impl Simulation {
         } else {
             let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
             self.expect_contact(dt, v);
-            let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?;
+            let info = match self.sleeper.as_mut().and_then(|s| s.awake.as_mut()) {
+                None => self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?,
+                Some(awake) => awake.step(x, v, self.state.time, dt, &pins)?,
+            };
             self.forget_contact(dt, x, v);
             (info, Holds::default(), 0)
         };
@@ -240,18 +270,32 @@ impl Simulation {
             return Ok(None);
         };
         let (x_t0, masses, pool) = (&self.state.x, &self.inv_mass, &self.pool);
+        if let Some(sleeper) = &mut self.sleeper {
+            let resting = Resting { moving: &sleeper.moving, asleep: &sleeper.asleep };
+            let result = responder.respond_resting(
+                mesh,
+                bvh,
+                continuous.other(),
+                resting,
+                masses,
+                x_t0,
+                x,
+                v,
+                dt,
+                pool,
+            );
+            let mut info = result.map_err(|error| response_failure(error, &sleeper.asleep))?;
+            sleeper.meetings = std::mem::take(&mut info.meetings);
+            for (name, seconds) in &info.seconds {
+                add_seconds(&mut report.seconds, name, *seconds);
+            }
+            return Ok(Some(info));
+        }
         let result = match continuous.other() {
             None => responder.respond(mesh, bvh, masses, x_t0, x, v, dt, pool),
             Some(other) => responder.respond_with(mesh, bvh, other, masses, x_t0, x, v, dt, pool),
         };
-        let info = result.map_err(|error| match error {
-            ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
-            ResponseError::NotFinite { name, vertex } => {
-                Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
-            }
-            ResponseError::Detect(DetectError::Device { reason, .. }) => Failure::Device(reason),
-            other => Failure::Stop(stage("contact", &other)),
-        })?;
+        let info = result.map_err(|error| response_failure(error, &[]))?;
         for (name, seconds) in &info.seconds {
             add_seconds(&mut report.seconds, name, *seconds);
         }
@@ -294,6 +338,24 @@ impl Simulation {
         let result = self.guard.check(&self.state.x, x, v).map_err(Failure::Alarm);
         add_seconds(&mut report.seconds, "guard", clock.elapsed().as_secs_f64());
         result
+    }
+}
+
+/// What an error of the response is to the step loop. `asleep`: per vertex; empty where nothing sleeps.
+fn response_failure(error: ResponseError, asleep: &[bool]) -> Failure {
+    let sleeps = |v: &u32| asleep.get(*v as usize).copied().unwrap_or(false);
+    match error {
+        ResponseError::Asleep { vertices } => Failure::Wake(vertices),
+        // Sleeping cloth does not give way; awake it may.
+        ResponseError::Unresolved { vertices, .. } if vertices.iter().any(sleeps) => {
+            Failure::Wake(vertices.into_iter().filter(sleeps).collect())
+        }
+        ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
+        ResponseError::NotFinite { name, vertex } => {
+            Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
+        }
+        ResponseError::Detect(DetectError::Device { reason, .. }) => Failure::Device(reason),
+        other => Failure::Stop(stage("contact", &other)),
     }
 }
 

@@ -15,11 +15,11 @@
 //! Source: \[wong2010\].
 
 mod adapt;
-mod contour;
+pub(crate) mod contour;
 mod dangling;
-mod distance;
+pub(crate) mod distance;
 mod every_frame;
-mod flat;
+pub(crate) mod flat;
 mod frame;
 mod options;
 mod pairs;

@@ -8,6 +8,7 @@
 //! the position itself, at both ends of every step, so that no change of speed can lose a contact.
 
 use super::distance::Row;
+use super::flat::Balls;
 use super::frame::{Following, Frame};
 use crate::bounds::middle;
 use crate::{CollisionMesh, Query, Vec3};
@@ -130,6 +131,11 @@ impl Room {
         });
         (room.middles, room.radii) = (middles, radii);
         Some(room)
+    }
+
+    /// The balls, for what only asks where vertices are.
+    pub(super) fn balls(&self) -> Balls<'_> {
+        Balls { middles: &self.middles, radii: &self.radii, thickness: self.thickness }
     }
 
     /// Middle and radius of the ball around the path of a vertex over (1+α) steps like that of `query`.

@@ -37,7 +37,7 @@ impl SkippingSession {
                 |loops: &[Vec<u32>], axis: &Vec3, position: &(dyn Fn(u32) -> Vec3 + Sync), clearance| {
                     contour::is_simple(loops, axis, position, clearance)
                 };
-            let flat = flat::mark(&mut self.boxes, tree, mesh, &room, contours, is_simple, pool);
+            let flat = flat::mark(&mut self.boxes, tree, mesh, &room.balls(), contours, is_simple, pool);
             (self.stats.flat_surfaces, self.stats.flat_triangles) = (flat.surfaces, flat.triangles);
         }
         let updated = Instant::now();
