@@ -26,8 +26,13 @@ impl<'a> Scene<'a> {
         Self::with(mesh, query, Motions::new_in(start(query), query.x_t1, query.thickness, pool))
     }
 
-    fn with(mesh: &'a CollisionMesh, query: &'a Query<'a>, motions: Motions) -> Self {
+    /// With these motions of the query's vertices.
+    pub(crate) fn with(mesh: &'a CollisionMesh, query: &'a Query<'a>, motions: Motions) -> Self {
         Self { mesh, query, motions, has_exclusions: mesh.has_attachments() || query.active.is_some() }
+    }
+
+    pub(crate) fn into_motions(self) -> Motions {
+        self.motions
     }
 
     /// Whether a pair that shares no vertex is to be decided. The traversal has seen to the bodies.
@@ -40,7 +45,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The positions at the start of the motion.
-fn start<'a>(query: &Query<'a>) -> &'a [Vec3] {
+pub(crate) fn start<'a>(query: &Query<'a>) -> &'a [Vec3] {
     if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 }
 }
 
@@ -75,6 +80,25 @@ impl<'a> Narrow<'a> {
 }
 
 impl Narrow<'_> {
+    /// Decides pairs of one kind that share no vertex, the lower edge first; `corners` are their vertices.
+    pub(crate) fn take_strangers(&mut self, kind: StencilKind, pairs: &[[u32; 2]], corners: &[[u32; 4]]) {
+        let Self { scene, waiting, vertices, .. } = self;
+        if scene.has_exclusions {
+            let split = if kind == StencilKind::VertexTriangle { 1 } else { 2 };
+            for (pair, corners) in pairs.iter().zip(corners) {
+                let (first, second) = corners.split_at(split);
+                if scene.is_wanted(first, second) {
+                    waiting.push(*pair);
+                    vertices.push(*corners);
+                }
+            }
+        } else {
+            waiting.extend_from_slice(pairs);
+            vertices.extend_from_slice(corners);
+        }
+        self.decide(kind);
+    }
+
     /// Decides the waiting pairs: their contacts.
     fn decide(&mut self, kind: StencilKind) {
         let Self { scene, waiting, vertices, batch, .. } = self;

@@ -14,6 +14,7 @@
 use super::contour::Contours;
 use super::distance::Row;
 use super::room::Room;
+use crate::bounds::LANES;
 use crate::bvh::build::Tree;
 use crate::bvh::refit::Boxes;
 use crate::{CollisionMesh, Vec3};
@@ -67,7 +68,7 @@ fn point(row: &Row) -> Vec3 {
 }
 
 fn leaf_cone(ids: &[u32], mesh: &CollisionMesh, room: &Room) -> Option<Cone> {
-    let (mut normals, mut count) = ([Vec3::zeros(); crate::bounds::LANES], 0);
+    let (mut normals, mut count) = ([Vec3::zeros(); LANES], 0);
     let (mut squared_height, mut radius) = (f64::INFINITY, 0.0f32);
     for &t in ids.iter().filter(|&&t| t != NONE) {
         let corners = mesh.triangles[t as usize];
@@ -112,8 +113,10 @@ pub(super) fn mark(
     pool: &rayon::ThreadPool,
 ) -> Found {
     let leaves = tree.triangle_ids.par_iter().with_min_len(CHUNK);
-    let mut cones: Vec<Option<Cone>> =
-        pool.install(|| leaves.map(|ids| leaf_cone(ids, mesh, room)).collect());
+    let meets_itself = |body: u32| mesh.bodies_meet(body, body);
+    let body_of = |ids: &[u32]| mesh.vertex_body[mesh.triangles[ids[0] as usize][0] as usize];
+    let cone = |ids: &[u32; LANES]| meets_itself(body_of(ids)).then(|| leaf_cone(ids, mesh, room)).flatten();
+    let mut cones: Vec<Option<Cone>> = pool.install(|| leaves.map(cone).collect());
     for inner in &tree.inner {
         let children = &cones[inner.first as usize..(inner.first + inner.count) as usize];
         cones.push(merged(children, room.thickness));
@@ -121,7 +124,6 @@ pub(super) fn mark(
     // Level by level from above: all of a level at once.
     let position = |v: u32| point(&room.middles[v as usize]);
     let mut found = Found::default();
-    let meets_itself = |body: u32| mesh.bodies_meet(body, body);
     let mut level: Vec<u32> = tree.roots.iter().filter(|r| meets_itself(r.body)).map(|r| r.block).collect();
     loop {
         level.retain(|&block| tree.inner(block).is_some());
@@ -216,7 +218,9 @@ mod tests {
         let pool = pool();
         let query = Query { x_t0: x, x_t1: x, thickness: 0.0, mode: Mode::Continuous, active: None };
         let tree = Bvh::new(&mesh, x).unwrap().tree;
-        let room = Room::new(&mesh, &query, Weights { alpha: 0.0, beta: 0.0, gamma: 0.0 }, &pool).unwrap();
+        let samples = super::super::samples::Samples::new(&mesh);
+        let room =
+            Room::new(&mesh, &samples, &query, Weights { alpha: 0.0, beta: 0.0, gamma: 0.0 }, &pool).unwrap();
         let contours = Contours::new(&tree, &mesh);
         let marked = |tested: bool| {
             let mut boxes = Boxes::<1>::default();
