@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema validation clean
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema validation stability clean
 
 help: ## List the targets
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -59,6 +59,9 @@ schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
+
+stability: build ## Run the stability atlas, every case over its whole map (half an hour); writes stability/
+	$(BIN)/clothsim stability -o stability --overwrite
 
 clean: ## Remove what the targets above made
 	rm -rf target $(VENV) out

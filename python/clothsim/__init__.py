@@ -13,7 +13,7 @@ Examples
 (121, 3)
 """
 
-from clothsim import bending, collision, errors, friction, study
+from clothsim import bending, collision, errors, friction, stability, study
 from clothsim._core import __version__
 from clothsim.errors import (
     CheckpointError,
@@ -69,5 +69,6 @@ __all__ = [
     "friction",
     "materials",
     "record",
+    "stability",
     "study",
 ]

@@ -17,6 +17,8 @@ __all__ = ["Detection", "SkippingSession", "detect", "edge_edge_ccd", "self_inte
 
 Method = Literal["brute", "bvh", "session", "grid", "virtual-subdivision", "octree-single", "octree", "auto"]
 Mode = Literal["continuous", "discrete"]
+Distribution = Literal["binary-search", "segmented-scan"]
+Duplicates = Literal["one-sort", "all"]
 
 _logger = logging.getLogger(__name__)
 
@@ -32,6 +34,8 @@ def detect(
     threads: int | None = None,
     *,
     cell_factor: float | None = None,
+    distribution: Distribution | str | None = None,
+    duplicates: Duplicates | str | None = None,
 ) -> Detection:
     """Find every vertex-triangle and edge-edge pair that shares no vertex and comes within ``thickness``.
 
@@ -63,6 +67,13 @@ def detect(
     cell_factor : float, optional
         λ of ``"virtual-subdivision"`` (thesis Eq. 5.1), 0.1 to 100: cells are 3 λ times the average radius.
         By default 1.2. The contacts do not depend on it.
+    distribution : {"binary-search", "segmented-scan"}, optional
+        How ``"grid"`` and ``"virtual-subdivision"`` find the tests of each invocation (thesis 5.3.4): by binary search
+        in the sums of the tests' counts, the default, or by a scan over all tests, two words of memory per test. The
+        contacts and the counts do not depend on it.
+    duplicates : {"one-sort", "all"}, optional
+        How ``"virtual-subdivision"`` finds several parts of one triangle in one cell (thesis 5.3.3): after one sort, by
+        cell, the default, or after sorts by triangle and by cell. The contacts do not depend on it.
 
     Returns
     -------
@@ -100,6 +111,8 @@ def detect(
         str(device),
         check_threads(threads),
         None if cell_factor is None else number(cell_factor, "cell_factor", "λ from 0.1 to 100"),
+        None if distribution is None else str(distribution),
+        None if duplicates is None else str(duplicates),
     )
     if fallback is not None:
         has_failed, reason = fallback

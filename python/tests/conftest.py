@@ -9,8 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
+import numpy as np
 import pytest
 
+import clothsim as cs
 from clothsim._data import VARIABLE, data_folder
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,6 +44,8 @@ film_strip = false
 plots = false
 checkpoint_interval = 0.1
 """
+
+GPU_METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 
 RunCli = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -84,6 +88,17 @@ def ccd_data() -> Path:
             pytest.fail(f"no ground truth: set {VARIABLE}")
         pytest.skip(f"no ground truth: neither ${VARIABLE} nor ../shared/data is there")
     return folder / "ccd"
+
+
+@pytest.fixture(scope="session")
+def gpu() -> str:
+    """Name of the adapter that detection finds; skips where there is none."""
+    x = np.eye(3)
+    try:
+        found = cs.collision.detect(x, x, [[0, 1, 2]], "grid", device="gpu")
+    except cs.GpuUnavailable as reason:
+        without_gpu(reason)
+    return str(found.stats["device"])
 
 
 def without_gpu(reason: object) -> NoReturn:

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import GPU_METHODS
 
 import clothsim as cs
 
-METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
 
 
@@ -26,20 +26,7 @@ def soup(seed: int, count: int = 150) -> tuple[Any, Any, Any]:
     return x, x + rng.normal(0, 0.1, x.shape), np.arange(3 * count).reshape(-1, 3)
 
 
-@pytest.fixture(scope="module")
-def gpu() -> str:
-    """Name of the adapter; skips where there is none."""
-    x = np.eye(3)
-    try:
-        found = cs.collision.detect(x, x, [[0, 1, 2]], "grid", device="gpu")
-    except cs.GpuUnavailable as reason:
-        if os.environ.get("CLOTHSIM_REQUIRE_GPU") == "1":
-            pytest.fail(f"CLOTHSIM_REQUIRE_GPU=1, but {reason}")
-        pytest.skip(str(reason))
-    return str(found.stats["device"])
-
-
-@pytest.mark.parametrize("method", [*METHODS, "auto"])
+@pytest.mark.parametrize("method", [*GPU_METHODS, "auto"])
 @pytest.mark.parametrize("mode", ["continuous", "discrete"])
 @pytest.mark.parametrize("thickness", [0.0, 0.02])
 def test_the_gpu_finds_what_the_cpu_finds(gpu: str, method: str, mode: str, thickness: float) -> None:
@@ -65,7 +52,7 @@ def test_threads_that_call_at_once_all_get_the_contacts(gpu: str) -> None:
     found: dict[int, cs.collision.Detection] = {}
 
     def work(k: int) -> None:
-        found[k] = cs.collision.detect(*frames[k], METHODS[k], device="gpu", threads=1)
+        found[k] = cs.collision.detect(*frames[k], GPU_METHODS[k], device="gpu", threads=1)
 
     workers = [threading.Thread(target=work, args=(k,)) for k in range(len(frames))]
     for worker in workers:
@@ -92,6 +79,30 @@ def test_cell_factor_changes_the_counts_and_not_the_contacts(gpu: str) -> None:
     assert len(set(tests[1:])) == len(tests) - 1, tests
 
 
+@pytest.mark.parametrize("mode", ["continuous", "discrete"])
+def test_variants_give_the_contacts_of_the_cpu(gpu: str, mode: str) -> None:
+    frames = soup(5, 300)
+    expected = cs.collision.detect(*frames, mode=mode, thickness=0.01)
+    assert len(expected.edge_edge) > 20
+    bytes_of: dict[tuple[str, str | None], set[int]] = {}
+    for distribution in (None, "binary-search", "segmented-scan"):
+        for method, duplicates in [
+            ("grid", None), *(("virtual-subdivision", d) for d in (None, "one-sort", "all")),
+        ]:  # fmt: skip
+            found = cs.collision.detect(
+                *frames, method, mode, 0.01, device="gpu", distribution=distribution, duplicates=duplicates
+            )
+            for name in ARRAYS:
+                np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
+            assert found.stats["method"] == method
+            bytes_of.setdefault((method, distribution), set()).add(found.stats["bytes"])
+    for method in ("grid", "virtual-subdivision"):
+        # The scan has memory of its own; without a choice it is the search.
+        assert bytes_of[method, None] == bytes_of[method, "binary-search"]
+        assert min(bytes_of[method, "segmented-scan"]) > max(bytes_of[method, "binary-search"])
+    assert len(bytes_of["virtual-subdivision", "binary-search"]) == 2, "sorts by triangle have memory of their own"
+
+
 def test_a_mesh_that_stays_on_the_gpu_is_not_taken_for_another(gpu: str) -> None:
     """Calls for one mesh share its upload; calls in between for others, of the same size, get their own."""
     x_t0, x_t1, triangles = soup(4, 60)
@@ -103,7 +114,7 @@ def test_a_mesh_that_stays_on_the_gpu_is_not_taken_for_another(gpu: str) -> None
             np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", GPU_METHODS)
 def test_no_triangles_have_no_contacts(gpu: str, method: str) -> None:
     x = np.zeros((3, 3))
     found = cs.collision.detect(x, x, np.zeros((0, 3), dtype=np.int64), method, device="gpu")
@@ -125,6 +136,21 @@ def test_no_triangles_have_no_contacts(gpu: str, method: str) -> None:
         ({"cell_factor": 1.2}, 'cell_factor: expected nothing, as only the method "virtual-subdivision" has it'),
         ({"cell_factor": 1.2, "method": "auto"}, 'got a value for "auto"'),
         ({"cell_factor": "wide"}, "cell_factor: expected λ from 0.1 to 100, got 'wide'"),
+        (
+            {"distribution": "segmented"},
+            '^distribution: expected one of "binary-search", "segmented-scan", got "segmented"',
+        ),
+        ({"distribution": "segmented-scam"}, 'did you mean "segmented-scan"'),
+        ({"duplicates": 3}, 'duplicates: expected one of "one-sort", "all", got "3"'),
+        (
+            {"distribution": "binary-search", "method": "octree"},
+            'only the methods "grid", "virtual-subdivision" have it',
+        ),
+        ({"distribution": "binary-search", "method": "bvh", "device": "cpu"}, 'got a value for "bvh"'),
+        (
+            {"duplicates": "all"},
+            'duplicates: expected nothing, as only the method "virtual-subdivision" has it.*"grid"',
+        ),
         ({"device": "gpus"}, 'device: expected one of "cpu", "gpu", "auto", got "gpus" .did you mean "gpu"'),
     ],
 )

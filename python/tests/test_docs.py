@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import doctest
 import importlib
-import os
 import pkgutil
 import subprocess
 import sys
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, without_gpu
 
 import clothsim as cs
 
@@ -117,9 +116,7 @@ def test_the_examples_on_gpus_run(tmp_path: Path) -> None:
         for block in blocks:
             exec(block, names)
     except cs.GpuUnavailable as reason:
-        if os.environ.get("CLOTHSIM_REQUIRE_GPU") == "1":
-            pytest.fail(f"CLOTHSIM_REQUIRE_GPU=1, but {reason}")
-        pytest.skip(str(reason))
+        without_gpu(reason)
     assert names["sim"].report["detection"].keys() == {"detector", "device", "why", "device_bytes"}
     commands = text.split("```sh\n")[1].split("```")[0].splitlines()
     for command in commands:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import without_gpu
 
 import clothsim as cs
 from clothsim import collision
@@ -21,15 +20,6 @@ from clothsim.reproduce.benchmarks import Benchmark, Suite
 
 ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
 QUICK = Effort(quick=True, threads=2)
-
-
-@pytest.fixture(scope="module")
-def gpu() -> str:
-    """Name of the adapter; skips where there is none."""
-    try:
-        return str(cs.collision.detect(np.eye(3), np.eye(3), [[0, 1, 2]], "grid", device="gpu").stats["device"])
-    except cs.GpuUnavailable as reason:
-        without_gpu(reason)
 
 
 # Contacts -----------------------------------------------------------------------------------------------------------
@@ -191,7 +181,7 @@ def test_figure_5_14_sees_too_few_and_too_many() -> None:
         counts = {}
         for b, factor in zip(suite.benchmarks, factors, strict=True):
             counts[b.name, counting.GRID], counts[b.name, counting.VIRTUAL] = counted(factor * 1e6), counted(1e6)
-        return failing(figure.checks(figure.Measured(suite, counts)))
+        return failing(figure.checks(counting.Compared(suite, counts)))
 
     assert of(12.0, 9.0, 2.0) == []
     assert of(7.9, 9.0, 9.0) == ["N-body: at least 8 times fewer tests"]
@@ -223,7 +213,7 @@ def test_figure_6_10_sees_too_many_tests_of_the_octree() -> None:
         tests = {counting.GRID: 9e6, counting.VIRTUAL: virtual, counting.SINGLE: single, counting.OCTREE: octree}
         counts = {("Funnel", method): counted(t) for method, t in tests.items()}
         counts |= {("N-body", method): counted(t) for method, t in zip(tests, (9e6, 5e6, 2e6, 2e6), strict=True)}
-        return failing(figure.checks(figure.Measured(suite, counts)))
+        return failing(figure.checks(counting.Compared(suite, counts)))
 
     assert of(1e6, 7e5, 6.1e5) == []
     assert of(1e6, 7e5, 6.2e5) == ["at least 39 % fewer tests than virtual subdivision, each benchmark"]

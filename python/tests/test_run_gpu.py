@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SCENE, RunCli
+from conftest import GPU_METHODS, SCENE, RunCli
 
 import clothsim as cs
 from clothsim import _core
 
-METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 # Thrown at the ball, 5 cm in a step: hundreds of collisions in the first frames.
 FALLING = (
     SCENE.replace("nx = 17, ny = 17", "nx = 11, ny = 11")
@@ -26,19 +25,6 @@ FALLING = (
     .replace("position = [0.02, 0.42, 0.01]", "position = [0.02, 0.42, 0.01]\nvelocity = [0, -10, 0]")
 )
 FRAMES = 5
-
-
-@pytest.fixture(scope="module")
-def gpu() -> str:
-    """Name of the adapter; skips where there is none."""
-    x = np.eye(3)
-    try:
-        found = cs.collision.detect(x, x, [[0, 1, 2]], "grid", device="gpu")
-    except cs.GpuUnavailable as reason:
-        if os.environ.get("CLOTHSIM_REQUIRE_GPU") == "1":
-            pytest.fail(f"CLOTHSIM_REQUIRE_GPU=1, but {reason}")
-        pytest.skip(str(reason))
-    return str(found.stats["device"])
 
 
 @pytest.fixture
@@ -68,7 +54,7 @@ def test_frames_are_those_of_the_cpu(gpu: str, tmp_path: Path) -> None:
     expected = frames(cpu)
     assert sum(step["contact"]["collisions"] for step in cpu.report["steps"]) > 50
     assert cpu.report["detection"]["detector"] == "bvh"
-    for method in METHODS:
+    for method in GPU_METHODS:
         sim = cs.Simulation(cs.Scene.load(falling(tmp_path / "scene.toml", method)), device="gpu")
         np.testing.assert_array_equal(frames(sim), expected)
         detection = sim.report["detection"]

@@ -20,6 +20,9 @@ pub(crate) trait OnDevice: Sized {
     /// Memory on the device \[B\].
     fn bytes(&self) -> u64;
 
+    /// What the last run counted, by name; zeros before the first.
+    fn counts(&self) -> Vec<(&'static str, u64)>;
+
     fn run(
         &mut self,
         mesh: &CollisionMesh,
@@ -89,7 +92,9 @@ impl<M: OnDevice> Topology<M> {
             return Err(DetectError::OtherMesh { expected: self.triangle_count, got: mesh.triangles.len() });
         }
         if mesh.triangles.is_empty() {
-            return Ok(Contacts::default());
+            let mut nothing = Contacts::default();
+            nothing.stats.counts = self.whole.as_ref().map_or(vec![], M::counts);
+            return Ok(nothing);
         }
         self.run(mesh, query, pool).map_err(|error| match error {
             GpuError::Query(error) => error,

@@ -47,10 +47,8 @@ fn agrees(method: &str, name: &str, modes: &[Mode], turns: &[&str]) {
             let clock = Instant::now();
             let got = grid.detect(&mesh, &query, &pool).unwrap();
             println!(
-                "{method}, {name}, {mode:?}, {turn}: {:.2} s, {} parts, {} registrations, {} MiB, {:?}",
+                "{method}, {name}, {mode:?}, {turn}: {:.2} s, {} MiB, {:?}",
                 clock.elapsed().as_secs_f64(),
-                grid.parts(),
-                grid.registrations(),
                 grid.bytes() >> 20,
                 got.stats
             );
@@ -147,9 +145,8 @@ fn octree_agrees(name: &str, mode: Mode, turns: &[&str]) {
             let clock = Instant::now();
             let got = octree.detect(&mesh, &query, &pool).unwrap();
             println!(
-                "{method}, {name}, {mode:?}, {turn}: {:.2} s, {:?} per level, {} MiB, {:?}",
+                "{method}, {name}, {mode:?}, {turn}: {:.2} s, {} MiB, {:?}",
                 clock.elapsed().as_secs_f64(),
-                octree.per_level(),
                 octree.bytes() >> 20,
                 got.stats
             );

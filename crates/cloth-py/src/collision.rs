@@ -37,7 +37,7 @@ type Answer<'py> = (
 
 /// All pairs in contact between two frames of one mesh; edges come back as their two vertices.
 #[pyfunction]
-#[pyo3(signature = (x_t0, x_t1, triangles, method, mode, thickness, device, threads, cell_factor))]
+#[pyo3(signature = (x_t0, x_t1, triangles, method, mode, thickness, device, threads, cell_factor, distribution, duplicates))]
 pub(crate) fn detect<'py>(
     py: Python<'py>,
     x_t0: &Bound<'py, PyAny>,
@@ -49,14 +49,17 @@ pub(crate) fn detect<'py>(
     device: &str,
     threads: Option<usize>,
     cell_factor: Option<f64>,
+    distribution: Option<&str>,
+    duplicates: Option<&str>,
 ) -> PyResult<Answer<'py>> {
     let device: Device = device.parse().map_err(|error| device_error(py, &error))?;
+    let tuning =
+        Tuning::new(cell_factor, distribution, duplicates).map_err(|error| device_error(py, &error))?;
     let mode = mode_from(py, mode)?;
     let x_t0 = vertices_from(x_t0, "x_t0")?;
     let x_t1 = vertices_from(x_t1, "x_t1")?;
     let triangles = triangles_from(triangles, "triangles", x_t0.len())?;
     let pool = pool(py, threads)?;
-    let tuning = Tuning { cell_factor };
     let work = || {
         let mesh = CollisionMesh::single(x_t0.len(), &triangles)?;
         let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
@@ -107,7 +110,7 @@ fn stats_to_dict<'py>(py: Python<'py>, detected: &Detected) -> PyResult<Bound<'p
     dict.set_item("candidates_vertex_triangle", stats.candidates_vertex_triangle)?;
     dict.set_item("candidates_edge_edge", stats.candidates_edge_edge)?;
     dict.set_item("root_searches", stats.root_searches)?;
-    for (name, count) in &detected.counts {
+    for (name, count) in &stats.counts {
         dict.set_item(*name, *count)?;
     }
     let seconds = PyDict::new(py);

@@ -7,7 +7,7 @@
 use cloth_sim::collision::DetectError;
 use cloth_sim::core::CoreError;
 use cloth_sim::core::mesh::MeshError;
-use cloth_sim::device::DeviceError;
+use cloth_sim::device::{DeviceError, only};
 use cloth_sim::{SceneError, SimError};
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -108,10 +108,10 @@ pub(crate) fn device_error(py: Python<'_>, error: &DeviceError) -> PyErr {
         DeviceError::WrongDevice { method, expected } => {
             invalid_input(py, "method", expected, &format!("\"{method}\""))
         }
-        DeviceError::OtherMethod { parameter, owner, method } => invalid_input(
+        DeviceError::OtherMethod { parameter, owners, method } => invalid_input(
             py,
             parameter,
-            &format!("nothing, as only the method \"{owner}\" has it"),
+            &format!("nothing, as {}", only(owners)),
             &format!("a value for \"{method}\""),
         ),
         DeviceError::Unavailable { .. } => exception(py, "GpuUnavailable", &error.to_string(), |_| Ok(())),

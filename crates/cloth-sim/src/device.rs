@@ -5,7 +5,9 @@ use crate::collision::{self, CollisionMesh, Contacts, DetectError, Query};
 use crate::scene::nearest;
 
 mod continuous;
+mod tuning;
 pub(crate) use continuous::Continuous;
+pub use tuning::Tuning;
 
 #[cfg(feature = "gpu")]
 mod adapters;
@@ -40,34 +42,6 @@ const CPU_DEFAULT: &str = "bvh";
 /// The method of `"auto"` on a GPU.
 const GPU_DEFAULT: &str = "virtual-subdivision";
 const DEVICES: [&str; 3] = ["cpu", "gpu", "auto"];
-
-/// The method that has λ.
-const SUBDIVIDING: &str = "virtual-subdivision";
-
-/// Choices within a GPU's method; the contacts never depend on them.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Tuning {
-    /// λ of `"virtual-subdivision"` (thesis Eq. 5.1): cells are 3 λ times the average radius. From 0.1 to 100; by default 1.2.
-    pub cell_factor: Option<f64>,
-}
-
-impl Tuning {
-    fn check(&self, method: &str) -> Result<(), DeviceError> {
-        let Some(got) = self.cell_factor else { return Ok(()) };
-        let parameter = "cell_factor";
-        if !(0.1..=100.0).contains(&got) {
-            return Err(DetectError::Parameter { parameter, expected: "λ from 0.1 to 100", got }.into());
-        }
-        if method != SUBDIVIDING {
-            return Err(DeviceError::OtherMethod {
-                parameter,
-                owner: SUBDIVIDING,
-                method: method.to_owned(),
-            });
-        }
-        Ok(())
-    }
-}
 
 /// Where to detect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -131,14 +105,12 @@ pub struct Adapter {
 /// The contacts, who found them, and why not somebody else.
 #[derive(Debug)]
 pub struct Detected {
-    /// The contacts; the same for every method on every device.
+    /// The contacts, the same for every method on every device; of a GPU, the counts hold the `bytes` of the method on the device.
     pub contacts: Contacts,
     /// Name of the method.
     pub method: &'static str,
     /// `"cpu"`, or the adapter with its driver.
     pub device: String,
-    /// What only this method counts: registrations, parts or leaves, bytes on the device; none on the CPU.
-    pub counts: Vec<(&'static str, u64)>,
     /// Why the CPU, where a GPU would have been taken.
     pub reason: Option<Reason>,
 }
@@ -176,14 +148,12 @@ pub enum DeviceError {
         expected: String,
     },
     /// The method has no such parameter.
-    #[error(
-        "{parameter}: expected nothing, as only the method \"{owner}\" has it, got a value for \"{method}\""
-    )]
+    #[error("{parameter}: expected nothing, as {}, got a value for \"{method}\"", only(owners))]
     OtherMethod {
         /// The parameter.
         parameter: &'static str,
-        /// The method that has it.
-        owner: &'static str,
+        /// The methods that have it.
+        owners: &'static [&'static str],
         /// The method that was asked for.
         method: String,
     },
@@ -215,6 +185,12 @@ fn did_you_mean(nearest: Option<&str>) -> String {
 
 fn quoted(names: &[&str]) -> String {
     names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+}
+
+/// Which methods alone have a parameter.
+pub fn only(owners: &[&str]) -> String {
+    let (methods, have) = if owners.len() == 1 { ("method", "has") } else { ("methods", "have") };
+    format!("only the {methods} {} {have} it", quoted(owners))
 }
 
 fn unknown(parameter: &'static str, got: &str, known: &[&'static str]) -> DeviceError {
@@ -304,5 +280,5 @@ fn detect_on_cpu(
 ) -> Result<Detected, DeviceError> {
     let x: &[Vec3] = query.x_t0;
     let contacts = collision::detector(method, mesh, x)?.detect(mesh, query, pool)?;
-    Ok(Detected { contacts, method, device: "cpu".to_owned(), counts: vec![], reason })
+    Ok(Detected { contacts, method, device: "cpu".to_owned(), reason })
 }

@@ -8,6 +8,7 @@ import json
 import signal
 from pathlib import Path
 
+from clothsim._cli.arguments import folder
 from clothsim._device import check_threads
 from clothsim.errors import InvalidInput
 from clothsim.reproduce import CATALOGUE, Effort, Outcome, find, reproduce
@@ -22,19 +23,13 @@ EXAMPLE = "clothsim reproduce 4.7 -o out/figure-4.7"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The figure, output folder, and how to run."""
     parser.add_argument("figure", metavar="FIGURE", nargs="?", help="4.7, table-4.1, 2010-7, … (see --list)")
-    parser.add_argument("-o", "--out", metavar="OUT", type=_folder, help="output folder")
+    parser.add_argument("-o", "--out", metavar="OUT", type=folder, help="output folder")
     parser.add_argument("--list", action="store_true", help="list every figure and table of both papers with its state")
     parser.add_argument("--quick", action="store_true", help="a coarse variant of the same experiment, in seconds")
     parser.add_argument("--mesh", metavar="FILE", type=Path, help="a mesh of your own, for figure 4.9")
     parser.add_argument("--overwrite", action="store_true", help="replace the figure if OUT holds it")
     parser.add_argument("--threads", metavar="N", type=int, help="how many threads (default: all)")
     parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
-
-
-def _folder(text: str) -> Path:
-    if not text.strip():
-        raise argparse.ArgumentTypeError(f"expected a folder, got {text!r}")
-    return Path(text)
 
 
 def execute(options: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from clothsim._cli.arguments import add_existing, add_out, count
 from clothsim._cli.device import add_device
 from clothsim._device import check_device, check_threads
 from clothsim._run.job import Job, Stopped
@@ -23,37 +24,18 @@ EXAMPLE = "clothsim run examples/drape.toml -o out/drape --threads 2"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Scene, output folder, and how to run."""
     parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    parser.add_argument("-o", "--out", metavar="OUT", required=True, type=_folder, help="output folder")
+    add_out(parser)
     parser.add_argument(
-        "--threads", metavar="N", type=_count, help="how many threads (default: all); results do not depend on it"
+        "--threads", metavar="N", type=count, help="how many threads (default: all); results do not depend on it"
     )
     add_device(parser)
-    parser.add_argument("--frames", metavar="N", type=_count, help="stop after N frames (default: the whole duration)")
+    parser.add_argument("--frames", metavar="N", type=count, help="stop after N frames (default: the whole duration)")
     parser.add_argument(
         "--allow-intersections",
         action="store_true",
         help="run from a start state in which triangles pass through others",
     )
-    mode = parser.add_mutually_exclusive_group()
-    mode.add_argument("--resume", action="store_true", help="go on with an unfinished run in OUT, or start one")
-    mode.add_argument("--overwrite", action="store_true", help="replace a run that OUT holds")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
-
-
-def _folder(text: str) -> Path:
-    if not text.strip():
-        raise argparse.ArgumentTypeError(f"expected a folder, got {text!r}")
-    return Path(text)
-
-
-def _count(text: str) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number ≥ 1, got {text!r}")
-    return value
+    add_existing(parser, "run")
 
 
 def execute(options: argparse.Namespace) -> int:

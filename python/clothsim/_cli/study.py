@@ -8,8 +8,9 @@ import shlex
 import signal
 import sys
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
+
+from clothsim._cli.arguments import add_existing, add_out, count
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
 
@@ -24,7 +25,7 @@ EXAMPLE = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The scene, what to vary and measure, and how to run."""
     parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    out_argument(parser)
+    add_out(parser)
     parser.add_argument(
         "--vary", metavar="AXIS=VALUES", action="append", default=[],
         help="values of an axis, by commas, or first:last:count (geometric); an axis is one of dt, integrator, "
@@ -44,11 +45,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--disturbance", metavar="V", type=float, default=1e-3, help="velocity of the disturbance [m/s] (default 1e-3)"
     )
-
-
-def out_argument(parser: argparse.ArgumentParser) -> None:
-    """The output folder."""
-    parser.add_argument("-o", "--out", metavar="OUT", required=True, type=_folder, help="output folder")
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
@@ -75,27 +71,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         type=float,
         help="stop a run, its repeats included, after so many seconds; its point is kept",
     )
-    mode = parser.add_mutually_exclusive_group()
-    mode.add_argument("--resume", action="store_true", help="go on with an unfinished study in OUT, or start one")
-    mode.add_argument("--overwrite", action="store_true", help="replace a study that OUT holds")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
-
-
-def _folder(text: str) -> Path:
-    if not text.strip():
-        raise argparse.ArgumentTypeError(f"expected a folder, got {text!r}")
-    return Path(text)
-
-
-def count(text: str) -> int:
-    """A whole number ≥ 1."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"expected a whole number ≥ 1, got {text!r}")
-    return value
+    add_existing(parser, "study")
 
 
 def interruptible() -> None:

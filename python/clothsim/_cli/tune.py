@@ -6,7 +6,8 @@ import argparse
 import json
 import sys
 
-from clothsim._cli.study import add_common, command, fixed_values, interruptible, out_argument
+from clothsim._cli.arguments import add_out
+from clothsim._cli.study import add_common, command, fixed_values, interruptible
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
 
@@ -18,7 +19,7 @@ EXAMPLE = "clothsim tune examples/hanging.toml --set duration=0.2 --set resoluti
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The scene, the bound, and how to run."""
     parser.add_argument("scene", metavar="SCENE", help="scene file (TOML)")
-    out_argument(parser)
+    add_out(parser)
     goal = parser.add_mutually_exclusive_group(required=True)
     goal.add_argument("--error", metavar="E", help="largest error, such as 1mm; the reference's own counts too")
     goal.add_argument("--budget", metavar="T", help="most time, such as 20ms (per frame of output.fps, or see --per)")

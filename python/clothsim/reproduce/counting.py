@@ -12,12 +12,12 @@ import numpy as np
 from clothsim import collision
 from clothsim._arrays import optional
 from clothsim.reproduce import pictures
-from clothsim.reproduce.benchmarks import Benchmark, Suite
-from clothsim.reproduce.contract import Check, Effort
+from clothsim.reproduce.benchmarks import SMALL, Benchmark, Suite, suite
+from clothsim.reproduce.contract import Check, Effort, Table
 
 __all__ = [
-    "GRID", "METHODS", "OCTREE", "SINGLE", "VIRTUAL", "Counted", "agreement", "bars", "chosen", "count", "device_words",
-    "foot", "left_out", "logarithmic", "million", "plain", "scenes", "shares",
+    "GRID", "METHODS", "OCTREE", "SINGLE", "VIRTUAL", "Compared", "Counted", "agreement", "bars", "chosen", "compare",
+    "count", "device_words", "foot", "left_out", "logarithmic", "million", "plain", "scenes", "shares",
 ]  # fmt: skip
 
 GRID, VIRTUAL = "grid", "virtual-subdivision"
@@ -116,6 +116,42 @@ def agreement(counted: Sequence[Counted]) -> list[Check]:
         Check("steps whose contacts are not those of the CPU", sum(c.differing for c in counted), 0.0, 0.0, reason),
         Check.true("there are contacts to find", all(c.contacts > 0 for c in counted), "each benchmark has some"),
     ]
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Counts of several methods on all benchmarks, by the names of both."""
+
+    suite: Suite
+    counts: dict[tuple[str, str], Counted]
+
+    def times(self, name: str, one: str, other: str) -> float:
+        """Tests of one method over those of another."""
+        return self.counts[name, one].tests / self.counts[name, other].tests
+
+    def table(self, column: str, ratio: Callable[[str, str], float]) -> dict[str, Table]:
+        """One row per benchmark and method; ``column`` holds the ratio for the names of both."""
+        columns = (
+            "benchmark", "method", "broad-phase tests", column, "tests per triangle", "registrations",
+            "memory on the device [MB]", "contacts",
+        )  # fmt: skip
+        triangles = {b.name: len(b.triangles) for b in self.suite.benchmarks}
+        rows = [
+            (name, method, c.tests, ratio(name, method), c.tests / triangles[name], c.registrations, c.bytes / 1e6,
+             c.contacts)
+            for (name, method), c in self.counts.items()
+        ]  # fmt: skip
+        return {"": Table(columns, rows)}
+
+
+def compare(effort: Effort, methods: Sequence[str], figure: str, *, quick: Sequence[str] = SMALL) -> Compared:
+    """Detect in each step of each benchmark, with each method."""
+    found = suite(effort, quick=quick)
+    with effort.bar(len(methods) * sum(len(b.steps) for b in found.benchmarks), figure, "call") as bar:
+        counts = {
+            (b.name, method): count(b, method, effort, done=bar.update) for b in found.benchmarks for method in methods
+        }
+    return Compared(found, counts)
 
 
 def chosen(suite: Suite) -> dict[str, Any]:

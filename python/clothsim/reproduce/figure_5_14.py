@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from clothsim.reproduce import pictures
-from clothsim.reproduce.benchmarks import COLOURS, Suite, suite
+from clothsim.reproduce.benchmarks import COLOURS
 from clothsim.reproduce.contract import Check, Effort, Table
 from clothsim.reproduce.counting import (
     GRID,
     VIRTUAL,
-    Counted,
+    Compared,
     agreement,
     bars,
     chosen,
-    count,
+    compare,
     foot,
     left_out,
     million,
@@ -32,31 +31,16 @@ THESIS = (
 TIMES_N_BODY = 8.0  # that many times fewer tests at least
 
 
-@dataclass(frozen=True)
-class Measured:
-    """Counts by benchmark and method."""
-
-    suite: Suite
-    counts: dict[tuple[str, str], Counted]
-
-    def times(self, name: str) -> float:
-        """Tests of the uniform grid over those of virtual subdivision."""
-        return self.counts[name, GRID].tests / self.counts[name, VIRTUAL].tests
+def measure(effort: Effort) -> Compared:
+    """Detect both ways."""
+    return compare(effort, (GRID, VIRTUAL), "figure 5.14")
 
 
-def measure(effort: Effort) -> Measured:
-    """Detect in each step of each benchmark, both ways."""
-    found = suite(effort)
-    with effort.bar(2 * sum(len(b.steps) for b in found.benchmarks), "figure 5.14", "call") as bar:
-        counts = {
-            (b.name, method): count(b, method, effort, done=bar.update)
-            for b in found.benchmarks
-            for method in (GRID, VIRTUAL)
-        }
-    return Measured(found, counts)
+def _times(measured: Compared, name: str) -> float:
+    return measured.times(name, GRID, VIRTUAL)
 
 
-def parameters(measured: Measured) -> Mapping[str, Any]:
+def parameters(measured: Compared) -> Mapping[str, Any]:
     """What was measured, on what."""
     return {
         **chosen(measured.suite), "mode": "continuous", "lambda": 1.2,
@@ -64,43 +48,32 @@ def parameters(measured: Measured) -> Mapping[str, Any]:
     }  # fmt: skip
 
 
-def tables(measured: Measured) -> Mapping[str, Table]:
+def tables(measured: Compared) -> Mapping[str, Table]:
     """One row per benchmark and method."""
-    columns = (
-        "benchmark", "method", "broad-phase tests", "grid over virtual subdivision", "tests per triangle",
-        "registrations", "memory on the device [MB]", "contacts",
-    )  # fmt: skip
-    rows = [
-        (b.name, method, c.tests, measured.times(b.name), c.tests / len(b.triangles), c.registrations, c.bytes / 1e6,
-         c.contacts)
-        for b in measured.suite.benchmarks
-        for method in (GRID, VIRTUAL)
-        for c in [measured.counts[b.name, method]]
-    ]  # fmt: skip
-    return {"": Table(columns, rows)}
+    return measured.table("grid over virtual subdivision", lambda name, _: _times(measured, name))
 
 
-def here(measured: Measured) -> str:
+def here(measured: Compared) -> str:
     """How many times fewer tests, per benchmark."""
     words = [
-        f"{b.name} {measured.times(b.name):.3g} ({million(measured.counts[b.name, GRID].tests)} to "
+        f"{b.name} {_times(measured, b.name):.3g} ({million(measured.counts[b.name, GRID].tests)} to "
         f"{million(measured.counts[b.name, VIRTUAL].tests)})"
         for b in measured.suite.benchmarks
     ]
     return left_out(measured.suite, f"times fewer tests with virtual subdivision: {', '.join(words)}")
 
 
-def checks(measured: Measured) -> Sequence[Check]:
+def checks(measured: Compared) -> Sequence[Check]:
     """The thesis's orders of magnitude; the contacts are those of the CPU."""
     source = "thesis 5.4.3, figure 5.14"
-    several = sum(measured.times(b.name) >= TIMES_N_BODY for b in measured.suite.benchmarks)
+    several = sum(_times(measured, b.name) >= TIMES_N_BODY for b in measured.suite.benchmarks)
     found = []
     if measured.suite.named("N-body") is not None:
-        few = measured.times("N-body") >= TIMES_N_BODY
+        few = _times(measured, "N-body") >= TIMES_N_BODY
         found.append(Check.true(f"N-body: at least {TIMES_N_BODY:g} times fewer tests", few, source))
     if not measured.suite.left_out:
         found.append(Check.true("about an order of magnitude fewer in several benchmarks", several >= 2, source))
-    fewer = all(measured.times(b.name) > 1.0 for b in measured.suite.benchmarks if b.name not in _EVEN)
+    fewer = all(_times(measured, b.name) > 1.0 for b in measured.suite.benchmarks if b.name not in _EVEN)
     found.append(Check.true("fewer tests wherever triangles differ much in size", fewer, source))
     return [*found, *agreement(list(measured.counts.values()))]
 
@@ -108,7 +81,7 @@ def checks(measured: Measured) -> Sequence[Check]:
 _EVEN = ("Reef knot (generated)", "Bowline (generated)")  # their cells are alike but for folds: little to subdivide
 
 
-def draw(measured: Measured) -> bytes:
+def draw(measured: Compared) -> bytes:
     """Tests of both methods, and their ratio."""
     note = foot(
         measured.suite,
@@ -121,8 +94,10 @@ def draw(measured: Measured) -> bytes:
     pictures.tidy(right, "uniform grid over virtual subdivision")
     bars(left, measured.suite, measured.counts, (GRID, VIRTUAL))
     for k, b in enumerate(measured.suite.benchmarks):
-        right.bar(k, measured.times(b.name), 0.62, color=COLOURS[b.name])
-        right.text(k, measured.times(b.name), f"{measured.times(b.name):.3g}", ha="center", va="bottom", fontsize=9.5)
+        right.bar(k, _times(measured, b.name), 0.62, color=COLOURS[b.name])
+        right.text(
+            k, _times(measured, b.name), f"{_times(measured, b.name):.3g}", ha="center", va="bottom", fontsize=9.5
+        )
         if b.name == "N-body":
             right.hlines(12.0, k - 0.31, k + 0.31, colors=pictures.INK, linestyles=(0, (3, 1.2)), linewidth=1.8)
     scenes(right, [b.name for b in measured.suite.benchmarks])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from clothsim.reproduce.contract import Check, Effort, Table
+from clothsim.reproduce.contract import Effort, Table
 from clothsim.reproduce.counting import VIRTUAL
 from clothsim.reproduce.timings import GROUPS, Parts, draw_parts, parts
 
@@ -32,17 +32,10 @@ def tables(measured: Parts) -> Mapping[str, Table]:
     return measured.tables(PRINTED)
 
 
-def here(measured: Parts) -> str:
-    """The shares."""
-    return measured.here()
-
-
-def checks(measured: Parts) -> Sequence[Check]:
-    """Only what does not depend on the device."""
-    return measured.checks()
+here = Parts.here
+checks = Parts.checks  # only what does not depend on the device
 
 
 def draw(measured: Parts) -> bytes:
     """The shares beside the thesis's."""
-    words = "Continuous detection on a GPU; the CPU decides what its filter leaves."
-    return draw_parts(measured, PRINTED, "Figure 5.15: steps of virtual subdivision", words)
+    return draw_parts(measured, PRINTED, "Figure 5.15: steps of virtual subdivision")

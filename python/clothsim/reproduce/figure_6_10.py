@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from clothsim.reproduce import pictures
-from clothsim.reproduce.benchmarks import Suite, suite
 from clothsim.reproduce.contract import Check, Effort, Table
 from clothsim.reproduce.counting import (
     GRID,
@@ -17,11 +15,11 @@ from clothsim.reproduce.counting import (
     OCTREE,
     SINGLE,
     VIRTUAL,
-    Counted,
+    Compared,
     agreement,
     bars,
     chosen,
-    count,
+    compare,
     foot,
     left_out,
     million,
@@ -38,29 +36,17 @@ LEAST = 39.0  # per cent fewer tests than virtual subdivision
 SHOWN = (GRID, VIRTUAL, SINGLE, OCTREE)
 
 
-@dataclass(frozen=True)
-class Measured:
-    """Counts by benchmark and method."""
-
-    suite: Suite
-    counts: dict[tuple[str, str], Counted]
-
-    def fewer(self, name: str, than: str, method: str = OCTREE) -> float:
-        """How many fewer tests than another method [%]."""
-        return 100.0 * (1.0 - self.counts[name, method].tests / self.counts[name, than].tests)
+def measure(effort: Effort) -> Compared:
+    """Detect with each method."""
+    return compare(effort, SHOWN, "figure 6.10", quick=("Funnel (generated)", "Bowline (generated)"))
 
 
-def measure(effort: Effort) -> Measured:
-    """Detect in each step of each benchmark, with each method."""
-    found = suite(effort, quick=("Funnel (generated)", "Bowline (generated)"))
-    with effort.bar(len(SHOWN) * sum(len(b.steps) for b in found.benchmarks), "figure 6.10", "call") as bar:
-        counts = {
-            (b.name, method): count(b, method, effort, done=bar.update) for b in found.benchmarks for method in SHOWN
-        }
-    return Measured(found, counts)
+def _fewer(measured: Compared, name: str, than: str, method: str = OCTREE) -> float:
+    """How many fewer tests than another method [%]."""
+    return 100.0 * (1.0 - measured.times(name, method, than))
 
 
-def parameters(measured: Measured) -> Mapping[str, Any]:
+def parameters(measured: Compared) -> Mapping[str, Any]:
     """What was measured, on what."""
     return {
         **chosen(measured.suite), "mode": "continuous", "lambda": 1.2,
@@ -68,31 +54,21 @@ def parameters(measured: Measured) -> Mapping[str, Any]:
     }  # fmt: skip
 
 
-def tables(measured: Measured) -> Mapping[str, Table]:
+def tables(measured: Compared) -> Mapping[str, Table]:
     """One row per benchmark and method."""
-    columns = (
-        "benchmark", "method", "broad-phase tests", "fewer than virtual subdivision [%]", "tests per triangle",
-        "registrations", "memory on the device [MB]", "contacts",
-    )  # fmt: skip
-    rows = [
-        (b.name, method, c.tests, measured.fewer(b.name, VIRTUAL, method), c.tests / len(b.triangles), c.registrations,
-         c.bytes / 1e6, c.contacts)
-        for b in measured.suite.benchmarks
-        for method in SHOWN
-        for c in [measured.counts[b.name, method]]
-    ]  # fmt: skip
-    return {"": Table(columns, rows)}
+    column = "fewer than virtual subdivision [%]"
+    return measured.table(column, lambda name, method: _fewer(measured, name, VIRTUAL, method))
 
 
-def here(measured: Measured) -> str:
+def here(measured: Compared) -> str:
     """How many fewer tests, per benchmark."""
     names = [b.name for b in measured.suite.benchmarks]
     words = [
-        f"{name} {measured.fewer(name, VIRTUAL):.0f} % ({million(measured.counts[name, VIRTUAL].tests)} to "
+        f"{name} {_fewer(measured, name, VIRTUAL):.0f} % ({million(measured.counts[name, VIRTUAL].tests)} to "
         f"{million(measured.counts[name, OCTREE].tests)})"
         for name in names
     ]
-    stages = [measured.fewer(name, SINGLE) for name in names]
+    stages = [_fewer(measured, name, SINGLE) for name in names]
     text = (
         f"fewer tests than virtual subdivision: {', '.join(words)}; two stages save up to {max(stages):.1f} %, on "
         f"average {np.mean(stages):.1f} %, over one"
@@ -100,14 +76,14 @@ def here(measured: Measured) -> str:
     return left_out(measured.suite, text)
 
 
-def checks(measured: Measured) -> Sequence[Check]:
+def checks(measured: Compared) -> Sequence[Check]:
     """The thesis's share; two stages never cost more than one; the contacts are those of the CPU."""
     source = "thesis 6.4.2, figure 6.10"
     names = [b.name for b in measured.suite.benchmarks]
     # Small meshes have few levels to adapt.
     least = 0.0 if measured.suite.is_quick else LEAST
-    few = all(measured.fewer(name, VIRTUAL) >= least for name in names)
-    more = max(-measured.fewer(name, SINGLE) for name in names)
+    few = all(_fewer(measured, name, VIRTUAL) >= least for name in names)
+    more = max(-_fewer(measured, name, SINGLE) for name in names)
     return [
         Check.true(f"at least {least:g} % fewer tests than virtual subdivision, each benchmark", few, source),
         Check.true("two stages never take more tests than one", more <= 0.0, "thesis 6.3.1: an optimum over all trees"),
@@ -115,7 +91,7 @@ def checks(measured: Measured) -> Sequence[Check]:
     ]
 
 
-def draw(measured: Measured) -> bytes:
+def draw(measured: Compared) -> bytes:
     """Tests of all methods, and how many fewer the octree takes."""
     note = foot(
         measured.suite,
@@ -129,7 +105,7 @@ def draw(measured: Measured) -> bytes:
     bars(left, measured.suite, measured.counts, SHOWN)
     for number, than in enumerate((VIRTUAL, SINGLE)):
         for k, b in enumerate(measured.suite.benchmarks):
-            place, value = k + 0.4 * (number - 0.5), measured.fewer(b.name, than)
+            place, value = k + 0.4 * (number - 0.5), _fewer(measured, b.name, than)
             right.bar(place, value, 0.38, color=METHODS[than], label=f"than {than}" if k == 0 else None)
             right.text(place, value, f"{value:.0f}", ha="center", va="bottom", fontsize=9.0)
     right.axhline(LEAST, color=pictures.INK, linestyle=(0, (3, 1.2)), linewidth=1.4)

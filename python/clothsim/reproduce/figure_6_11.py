@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
 
-from clothsim.reproduce.contract import Check, Effort, Table
+from clothsim.reproduce.contract import Effort, Table
 from clothsim.reproduce.counting import OCTREE
 from clothsim.reproduce.timings import OCTREE_GROUPS, Parts, draw_parts, parts
 
@@ -21,9 +20,7 @@ def measure(effort: Effort) -> Parts:
     return parts(effort, OCTREE, SHOWN, OCTREE_GROUPS, "figure 6.11")
 
 
-def parameters(measured: Parts) -> Mapping[str, Any]:
-    """What was timed, on what."""
-    return measured.parameters()
+parameters = Parts.parameters
 
 
 def tables(measured: Parts) -> Mapping[str, Table]:
@@ -31,17 +28,10 @@ def tables(measured: Parts) -> Mapping[str, Table]:
     return measured.tables(PRINTED)
 
 
-def here(measured: Parts) -> str:
-    """The shares."""
-    return measured.here()
-
-
-def checks(measured: Parts) -> Sequence[Check]:
-    """Only what does not depend on the device."""
-    return measured.checks()
+here = Parts.here
+checks = Parts.checks  # only what does not depend on the device
 
 
 def draw(measured: Parts) -> bytes:
     """The shares beside the thesis's."""
-    words = "Continuous detection on a GPU; the CPU decides what its filter leaves."
-    return draw_parts(measured, PRINTED, "Figure 6.11: steps of the octree grid", words)
+    return draw_parts(measured, PRINTED, "Figure 6.11: steps of the octree grid")

@@ -15,7 +15,7 @@ import numpy as np
 from clothsim._arrays import Floats
 from clothsim.reproduce.moving import Moving, joined, length_of, sheet, whole
 
-__all__ = ["bowline", "reef"]
+__all__ = ["bowline", "centre_lines", "reef"]
 
 ACROSS = 16  # cells across a ribbon: four pleats of four
 _PLEATS = 4
@@ -64,6 +64,14 @@ def reef(columns: int = 313, *, length: float = 1.0, steps: int = 3) -> Moving:
 def bowline(columns: int = 344, *, length: float = 1.0, steps: int = 3) -> Moving:
     """One ribbon tied into a bowline; the parameters are those of `reef`."""
     return _tied(_BOWLINE, columns, length, 50.0, 0.5, steps, 1.0)
+
+
+def centre_lines(knot: str) -> list[Floats]:
+    """Smooth centre lines of the drawing of a ``"reef"`` knot (two) or a ``"bowline"``, in units of the drawing.
+
+    Where lines cross they are 2 apart in the reef knot, at least 1 in the bowline.
+    """
+    return [_smooth(np.array(points)) for points in {"reef": _REEF, "bowline": _BOWLINE}[knot]]
 
 
 def _tied(

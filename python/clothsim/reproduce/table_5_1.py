@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from clothsim.reproduce.contract import Check, Effort, Table
-from clothsim.reproduce.counting import VIRTUAL, device_words, left_out, plain
-from clothsim.reproduce.timings import MODES, Times, draw_times, times
+from clothsim.reproduce.contract import Effort, Table
+from clothsim.reproduce.counting import VIRTUAL
+from clothsim.reproduce.timings import Times, draw_times, times
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
 
@@ -34,32 +34,16 @@ def parameters(measured: Times) -> Mapping[str, Any]:
 
 def tables(measured: Times) -> Mapping[str, Table]:
     """One row per benchmark beside the thesis's, and the stages."""
-    columns = (
-        "benchmark", "triangles", "DCD [ms]", "CCD [ms]", "memory on the device [MB]", "DCD tests", "CCD tests",
-        "thesis: benchmark", "thesis: triangles, thousands", "thesis: DCD [ms]", "thesis: CCD [ms]",
-    )  # fmt: skip
-    rows = []
-    for b in measured.suite.benchmarks:
-        counts = [measured.counts[b.name, VIRTUAL, mode] for mode in MODES]
-        rows.append((
-            b.name, len(b.triangles), *(c.milliseconds for c in counts), max(c.bytes for c in counts) / 1e6,
-            *(c.tests for c in counts), b.thesis, *PRINTED[b.thesis],
-        ))  # fmt: skip
-    return {"": Table(columns, rows), "stages": measured.stages()}
+    columns = ("triangles, thousands", "DCD [ms]", "CCD [ms]")
+    return measured.tables(VIRTUAL, columns, PRINTED)
 
 
 def here(measured: Times) -> str:
     """Milliseconds per benchmark."""
-    words = [
-        f"{b.name} {' and '.join(plain(measured.milliseconds(b.name, VIRTUAL, mode)) for mode in MODES)}"
-        for b in measured.suite.benchmarks
-    ]
-    return left_out(measured.suite, f"{', '.join(words)} ms; {device_words(measured.device)}")
+    return measured.here(VIRTUAL)
 
 
-def checks(measured: Times) -> Sequence[Check]:
-    """Only what does not depend on the device."""
-    return measured.checks()
+checks = Times.checks  # only what does not depend on the device
 
 
 def draw(measured: Times) -> bytes:

@@ -73,6 +73,29 @@ class Times:
             **{f"thickness of discrete detection, {b.name} [m]": b.thickness for b in self.suite.benchmarks},
         }  # fmt: skip
 
+    def tables(self, method: str, columns: Sequence[str], printed: Mapping[str, Sequence[float]]) -> dict[str, Table]:
+        """One row per benchmark, in ``columns`` what the thesis printed of it, and the stages."""
+        rows = []
+        for b in self.suite.benchmarks:
+            counts = [self.counts[b.name, method, mode] for mode in MODES]
+            rows.append((
+                b.name, len(b.triangles), *(c.milliseconds for c in counts), max(c.bytes for c in counts) / 1e6,
+                *(c.tests for c in counts), b.thesis, *printed.get(b.thesis, (float("nan"),) * len(columns)),
+            ))  # fmt: skip
+        names = (
+            "benchmark", "triangles", "DCD [ms]", "CCD [ms]", "memory on the device [MB]", "DCD tests", "CCD tests",
+            "thesis: benchmark", *(f"thesis: {column}" for column in columns),
+        )  # fmt: skip
+        return {"": Table(names, rows), "stages": self.stages()}
+
+    def here(self, method: str) -> str:
+        """Milliseconds per benchmark."""
+        words = [
+            f"{b.name} {' and '.join(plain(self.milliseconds(b.name, method, mode)) for mode in MODES)}"
+            for b in self.suite.benchmarks
+        ]
+        return left_out(self.suite, f"{', '.join(words)} ms; {device_words(self.device)}")
+
     def stages(self) -> Table:
         """Each stage of each detection."""
         columns = ("benchmark", "method", "mode", "stage", "time [ms]", "share [%]")
@@ -195,10 +218,11 @@ def parts(effort: Effort, method: str, wanted: str, groups: Mapping[str, Sequenc
     return Parts(found, benchmark.name, benchmark.name == wanted, counted, dict(groups))
 
 
-def draw_parts(measured: Parts, printed: Mapping[str, float], title: str, note: str) -> bytes:
+def draw_parts(measured: Parts, printed: Mapping[str, float], title: str) -> bytes:
     """Shares of the steps, the thesis's as far as its text has them, and the stages in them."""
     note = (
-        f"{note} {measured.name}; {device_words(measured.counted.device)}. Dashes: the thesis, as far as its text says."
+        "Continuous detection on a GPU; the CPU decides what its filter leaves. "
+        f"{measured.name}; {device_words(measured.counted.device)}. Dashes: the thesis, as far as its text says."
     )
     figure = pictures.figure(title, (12.0, 5.2), note)
     left, right = figure.subplots(1, 2)

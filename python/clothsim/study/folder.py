@@ -28,11 +28,25 @@ def fingerprint(facts: Any, extra: bytes = b"") -> str:
 
 
 class StudyFolder(RunFolder):
-    """``OUT`` and its work folder."""
+    """``OUT`` and its work folder.
+
+    Attributes
+    ----------
+    noun, article : str
+        What it holds, in messages.
+    outputs : tuple of str
+        What may be written into it.
+    facts_file : str
+        The one of them that is written last and has the digest.
+    """
+
+    noun, article = "study", "a"
+    outputs: tuple[str, ...] = (*OUTPUTS, "tuned.toml", "tune.json")
+    facts_file = "study.json"
 
     def present(self) -> list[str]:
         """Outputs that are there."""
-        return [name for name in (*OUTPUTS, "tuned.toml", "tune.json") if (self.out / name).exists()]
+        return [name for name in self.outputs if (self.out / name).exists()]
 
     def begin(self, digest: str, *, resume: bool, overwrite: bool) -> dict[str, Any] | None:
         """Refuse a folder in use; return the facts of the same study if it is complete and to be resumed.
@@ -49,29 +63,32 @@ class StudyFolder(RunFolder):
         runs = RunFolder(self.out).present()
         if runs or (self.holds_work and not self._digest_file.exists()):
             raise OutputExists(f"{self.out}: holds a run of a scene; choose another folder")
+        noun = self.noun
         if overwrite:
             return None
         if self.started and self._digest_file.exists():
             if not resume:
                 raise OutputExists(
-                    f"{self.out}: holds an unfinished study; --resume goes on with it, --overwrite starts anew"
+                    f"{self.out}: holds an unfinished {noun}; --resume goes on with it, --overwrite starts anew"
                 )
             if self._digest_file.read_text() != digest:
-                raise CheckpointError(f"{self.out}: the unfinished study is another one; --overwrite starts anew")
+                raise CheckpointError(f"{self.out}: the unfinished {noun} is another one; --overwrite starts anew")
             return None
         present = self.present()
         if present and not resume:
-            raise OutputExists(f"{self.out}: holds a study already ({', '.join(present)}); --overwrite replaces it")
+            raise OutputExists(
+                f"{self.out}: holds {self.article} {noun} already ({', '.join(present)}); --overwrite replaces it"
+            )
         return self._complete(digest) if present else None
 
     def _complete(self, digest: str) -> dict[str, Any]:
         try:
-            facts = json.loads((self.out / "study.json").read_bytes())
+            facts = json.loads((self.out / self.facts_file).read_bytes())
             same = facts["digest"] == digest
         except (OSError, ValueError, KeyError, TypeError):
             same = False
         if not same:
-            raise CheckpointError(f"{self.out}: the finished study is another one; --overwrite starts anew")
+            raise CheckpointError(f"{self.out}: the finished {self.noun} is another one; --overwrite starts anew")
         return dict(facts)
 
     @property

@@ -29,11 +29,14 @@ class Job:
     path : Path
         Where its results go, without a suffix.
     spec : dict
-        What the worker is told.
+        What the worker is told; its ``threads`` is how many cores it gets.
+    worker : str
+        Module that is run; it hands itself to `clothsim.study.process.serve`.
     """
 
     path: Path
     spec: dict[str, Any] = field(hash=False)
+    worker: str = "clothsim.study.worker"
 
     @property
     def done(self) -> bool:
@@ -127,12 +130,12 @@ def _start(job: Job, own: list[int]) -> subprocess.Popen[bytes]:
     single = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     with job.path.with_suffix(".stderr").open("wb") as errors:
         return subprocess.Popen(
-            [sys.executable, "-m", "clothsim.study.worker", str(job.path.with_suffix(".job"))],
+            [sys.executable, "-m", job.worker, str(job.path.with_suffix(".job"))],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=errors,
             env={**os.environ, **single},
-            start_new_session=True,  # Ctrl-C comes to the study, which stops its runs
+            start_new_session=True,  # Ctrl-C comes to the parent, which stops its runs
         )
 
 

@@ -6,26 +6,23 @@ Its own process gives it cores of its own and a peak of memory of its own, and w
 from __future__ import annotations
 
 import json
-import os
 import pickle
 import sys
-import threading
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from clothsim._files import whole, write_whole
-from clothsim.errors import ClothSimError
 from clothsim.mesh import Mesh
 from clothsim.scene import Scene
 from clothsim.simulation import Simulation
 from clothsim.study.axes import variant
 from clothsim.study.disturb import disturbed
+from clothsim.study.process import serve
 from clothsim.study.state import pinned
 
-__all__ = ["main", "pack_scene", "run_job"]
+__all__ = ["pack_scene", "run_job"]
 
 # Share of the run after which what sticks is watched.
 LATE = 0.75
@@ -171,32 +168,5 @@ def _resident(what: str) -> int:
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
-def _die_with_parent() -> None:
-    """End when the parent does, however it ends: its end of the pipe closes."""
-
-    def watch() -> None:
-        while os.read(0, 4096):  # not through sys.stdin, whose lock would outlive the interpreter
-            pass
-        os._exit(3)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def main(path: Path) -> int:
-    """Run the job in a file; write ``<stem>.npz`` and then ``<stem>.result`` beside it, each whole or not at all."""
-    _die_with_parent()
-    job = json.loads(path.read_bytes())
-    if job["cores"] and hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, job["cores"])
-    try:
-        facts, arrays = run_job(job)
-        with whole(path.with_suffix(".npz")) as file:
-            np.savez(file, **arrays)
-    except (ClothSimError, MemoryError) as error:
-        facts = {"error": str(error) or type(error).__name__, "error_type": type(error).__name__}
-    write_whole(path.with_suffix(".result"), json.dumps(facts).encode())
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(serve(Path(sys.argv[1]), run_job))

@@ -81,6 +81,10 @@ impl OnDevice for Core {
         self.portions.bytes() + subdivision + self.grid.cells.bytes()
     }
 
+    fn counts(&self) -> Vec<(&'static str, u64)> {
+        self.grid.counts()
+    }
+
     fn run(
         &mut self,
         mesh: &CollisionMesh,

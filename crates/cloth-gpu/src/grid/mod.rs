@@ -79,11 +79,12 @@ const LAMBDAS: [f32; 2] = [0.1, 100.0];
 /// The device finds candidates; [`crate::collision::NarrowPhase`] decides them. What overflows is grown and done again; what is too
 /// much for one portion is taken in several, which are decided as they come and not kept; a scene that is too large for the
 /// device's bindings is taken in chunks ([`crate::chunks`]).
+///
+/// Among the counts of [`crate::collision::DetectStats`]: `registrations` of triangles in cells; the `parts` that these come to, at
+/// least as many as triangles.
 #[derive(Debug)]
 pub struct GridGpu {
     topology: Topology<Core>,
-    registrations: u64,
-    parts: u64,
 }
 
 impl GridGpu {
@@ -118,17 +119,7 @@ impl GridGpu {
             }));
         }
         let topology = Topology::new(gpu, mesh, options, options.max_triangles)?;
-        Ok(Self { topology, registrations: 0, parts: 0 })
-    }
-
-    /// Registrations of triangles in cells in the last call.
-    pub fn registrations(&self) -> u64 {
-        self.registrations
-    }
-
-    /// Parts that triangles were registered in, in the last call: at least as many as triangles.
-    pub fn parts(&self) -> u64 {
-        self.parts
+        Ok(Self { topology })
     }
 
     /// Memory on the device, scratch memory of sorts and scans not counted [B]; 0 where the scene goes in chunks, which keep none.
@@ -148,9 +139,6 @@ impl Detector for GridGpu {
         query: &Query<'_>,
         pool: &rayon::ThreadPool,
     ) -> Result<Contacts, DetectError> {
-        let contacts = self.topology.detect(self.name(), mesh, query, pool)?;
-        self.registrations = contacts.stats.count("registrations");
-        self.parts = contacts.stats.count("parts");
-        Ok(contacts)
+        self.topology.detect(self.name(), mesh, query, pool)
     }
 }

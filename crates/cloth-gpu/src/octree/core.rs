@@ -5,7 +5,7 @@ use crate::collision::{CollisionMesh, Contacts, Query};
 use crate::context::Gpu;
 use crate::error::GpuError;
 use crate::frame::Frame;
-use crate::limits::TALLY_LENGTH;
+use crate::limits::{MAX_LEVELS, TALLY_LENGTH};
 use crate::portions::{PortionOptions, Portions, Registrar};
 use crate::recorder::{Answer, Recorder};
 use crate::stages::bounds::Scene;
@@ -24,6 +24,20 @@ const FIRST_LEVELS: u32 = 9;
 const FIRST_PAGES: usize = 16;
 /// Visits and registrations per triangle that there is room for at first.
 const PER_TRIANGLE: usize = 8;
+/// Names of the registrations by level, the root first.
+const BY_LEVEL: [&str; MAX_LEVELS as usize + 1] = [
+    "registrations_level_0",
+    "registrations_level_1",
+    "registrations_level_2",
+    "registrations_level_3",
+    "registrations_level_4",
+    "registrations_level_5",
+    "registrations_level_6",
+    "registrations_level_7",
+    "registrations_level_8",
+    "registrations_level_9",
+    "registrations_level_10",
+];
 
 /// A scene's octree with its room.
 #[derive(Debug)]
@@ -52,7 +66,7 @@ impl Core {
     }
 
     /// Registrations per level, as the last tree had them.
-    pub(super) fn per_level(&self) -> &[u32] {
+    fn per_level(&self) -> &[u32] {
         &self.tree.tally[..TALLY_LENGTH as usize - 1]
     }
 }
@@ -92,6 +106,10 @@ impl OnDevice for Core {
 
     fn bytes(&self) -> u64 {
         self.portions.bytes() + self.tree.octree.bytes()
+    }
+
+    fn counts(&self) -> Vec<(&'static str, u64)> {
+        self.tree.counts()
     }
 
     fn run(
@@ -148,11 +166,14 @@ impl Registrar for Tree {
 
     fn counts(&self) -> Vec<(&'static str, u64)> {
         let (levels, leaves) = self.tally.split_at(TALLY_LENGTH as usize - 1);
-        vec![
-            ("registrations", levels.iter().map(|&n| u64::from(n)).sum()),
+        let levels = levels.iter().map(|&n| u64::from(n));
+        let mut counts = vec![
+            ("registrations", levels.clone().sum()),
             ("leaves", leaves[0].into()),
             ("coarsest_level", self.levels.top.into()),
             ("finest_level", self.levels.base.into()),
-        ]
+        ];
+        counts.extend(BY_LEVEL.into_iter().zip(levels));
+        counts
     }
 }

@@ -53,10 +53,13 @@ impl Default for OctreeOptions {
 /// The device finds candidates; [`crate::collision::NarrowPhase`] decides them. What overflows is grown and done again; what is too
 /// much for one portion is taken in several; a scene that is too large for the device's bindings is taken in chunks
 /// ([`crate::chunks`]), whose levels do not adapt.
+///
+/// Among the counts of [`crate::collision::DetectStats`]: `registrations` of triangles in cells, `registrations_level_0` to `_10` by
+/// level, the root first, and `leaves` that hold triangles, in chunks those of all; of a scene that goes whole, `coarsest_level` and
+/// `finest_level` of the tree.
 #[derive(Debug)]
 pub struct OctreeGpu {
     topology: Topology<Core>,
-    counted: Vec<(&'static str, u64)>,
 }
 
 impl OctreeGpu {
@@ -93,23 +96,12 @@ impl OctreeGpu {
             }));
         }
         let topology = Topology::new(gpu, mesh, options, options.max_triangles)?;
-        Ok(Self { topology, counted: vec![] })
+        Ok(Self { topology })
     }
 
     /// Levels of the next call's tree; None where the scene goes in chunks.
     pub fn levels(&self) -> Option<Levels> {
         self.topology.whole().map(Core::levels)
-    }
-
-    /// Registrations per level in the last call; none where the scene goes in chunks.
-    pub fn per_level(&self) -> &[u32] {
-        self.topology.whole().map_or(&[], Core::per_level)
-    }
-
-    /// What the last call counted, by name: registrations, leaves that hold triangles, coarsest and finest level of the tree; in chunks,
-    /// the registrations and leaves of all.
-    pub fn counted(&self) -> &[(&'static str, u64)] {
-        &self.counted
     }
 
     /// Memory on the device, scratch memory of sorts and scans not counted [B]; 0 where the scene goes in chunks, which keep none.
@@ -134,8 +126,6 @@ impl Detector for OctreeGpu {
             // Every chunk has its own levels.
             contacts.stats.counts.retain(|c| !["coarsest_level", "finest_level"].contains(&c.0));
         }
-        let known = ["registrations", "leaves", "coarsest_level", "finest_level"];
-        self.counted = contacts.stats.counts.iter().copied().filter(|c| known.contains(&c.0)).collect();
         Ok(contacts)
     }
 }

@@ -6,7 +6,7 @@
 pub(crate) mod npz;
 
 use bytemuck::Pod;
-use cloth_gpu::collision::{Body, CollisionMesh, Contacts, Vec3};
+use cloth_gpu::collision::{Body, BruteForce, CollisionMesh, Contacts, Detector, Query, Vec3};
 use cloth_gpu::{Array, Gpu, GpuError, GpuOptions, Recorder};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -147,6 +147,29 @@ pub(crate) fn bodies(random: &mut Random) -> (CollisionMesh, Vec<Vec3>) {
         mesh.set_attachment(vertex, 1 + random.below(4) as u32);
     }
     (mesh, parts.into_iter().flat_map(|p| p.0).collect())
+}
+
+/// Asks each method twice, then with the room of the first time, an octree three times, whose levels adapt; compares with brute force;
+/// returns the contacts' number, once for each method.
+pub(crate) fn agree<'m, D: Detector + ?Sized + 'm>(
+    methods: impl IntoIterator<Item = &'m mut D>,
+    mesh: &CollisionMesh,
+    query: &Query<'_>,
+    what: &str,
+) -> usize {
+    let pool = pool(2);
+    let expected = BruteForce.detect(mesh, query, &pool).unwrap();
+    let mut found = 0;
+    for method in methods {
+        let turns = if method.name().starts_with("octree") { 3 } else { 2 };
+        for turn in 0..turns {
+            let got = method.detect(mesh, query, &pool).unwrap();
+            assert_eq!(difference(&expected, &got), None, "{}, {what}, {turn}", method.name());
+            assert!(got.stats.candidates_edge_edge >= got.edge_edge.len() as u64);
+        }
+        found += expected.vertex_triangle.len() + expected.edge_edge.len();
+    }
+    found
 }
 
 /// None if the contacts are equal, pairs and times; else what differs.

@@ -2,7 +2,7 @@
 
 use super::Tuning;
 use crate::collision::{CollisionMesh, DetectError, Detector};
-use crate::gpu::{Gpu, GpuError, GridGpu, GridOptions, OctreeGpu, OctreeOptions};
+use crate::gpu::{Distribution, Duplicates, Gpu, GpuError, GridGpu, GridOptions, OctreeGpu, OctreeOptions};
 use std::sync::Arc;
 
 /// λ of virtual subdivision where nothing else is asked for (thesis 5.3).
@@ -12,45 +12,17 @@ const CELL_FACTOR: f64 = 1.2;
 pub(crate) trait GpuMethod: Detector + std::fmt::Debug {
     /// Memory on the device \[B\].
     fn bytes(&self) -> u64;
-
-    /// What the last call counted beside [`crate::collision::DetectStats`].
-    fn counted(&self) -> Vec<(&'static str, u64)>;
 }
-
-/// Names of an octree's registrations by level, the root first.
-const BY_LEVEL: [&str; 11] = [
-    "registrations_level_0",
-    "registrations_level_1",
-    "registrations_level_2",
-    "registrations_level_3",
-    "registrations_level_4",
-    "registrations_level_5",
-    "registrations_level_6",
-    "registrations_level_7",
-    "registrations_level_8",
-    "registrations_level_9",
-    "registrations_level_10",
-];
 
 impl GpuMethod for GridGpu {
     fn bytes(&self) -> u64 {
         Self::bytes(self)
-    }
-
-    fn counted(&self) -> Vec<(&'static str, u64)> {
-        vec![("registrations", self.registrations()), ("parts", self.parts())]
     }
 }
 
 impl GpuMethod for OctreeGpu {
     fn bytes(&self) -> u64 {
         Self::bytes(self)
-    }
-
-    fn counted(&self) -> Vec<(&'static str, u64)> {
-        let mut counts = Self::counted(self).to_vec();
-        counts.extend(BY_LEVEL.into_iter().zip(self.per_level().iter().map(|&n| u64::from(n))));
-        counts
     }
 }
 
@@ -61,8 +33,16 @@ pub(crate) fn build(
     method: &'static str,
     tuning: &Tuning,
 ) -> Result<Box<dyn GpuMethod>, DetectError> {
+    let distribution = match tuning.distribution {
+        Some("segmented-scan") => Distribution::SegmentedScan,
+        _ => Distribution::BinarySearch,
+    };
+    let duplicates = match tuning.duplicates {
+        Some("all") => Duplicates::All,
+        _ => Duplicates::OneSort,
+    };
     let grid = |gpu, subdivision| {
-        let options = GridOptions { subdivision, ..GridOptions::default() };
+        let options = GridOptions { subdivision, distribution, duplicates, ..GridOptions::default() };
         Ok(Box::new(GridGpu::with_options(gpu, mesh, options)?) as Box<dyn GpuMethod>)
     };
     let octree = |gpu, two_stage| {
@@ -157,7 +137,7 @@ mod tests {
         for (swapped, tuning) in [
             (false, Tuning::default()),
             (true, Tuning::default()),
-            (false, Tuning { cell_factor: Some(3.0) }),
+            (false, Tuning { cell_factor: Some(3.0), ..Tuning::default() }),
             (false, Tuning::default()),
             (false, Tuning::default()),
         ] {

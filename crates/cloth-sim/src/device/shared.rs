@@ -101,15 +101,12 @@ impl SharedGpu {
     ) -> Result<Detected, DeviceError> {
         let answer = self.with(device, |open| {
             let kept = open.kept.get(&open.gpu, mesh, method, tuning)?;
-            let contacts = kept.detect(mesh, query, pool)?;
-            let mut counts = kept.counted();
-            counts.push(("bytes", kept.bytes()));
-            Ok((contacts, counts))
+            let mut contacts = kept.detect(mesh, query, pool)?;
+            contacts.stats.counts.push(("bytes", kept.bytes()));
+            Ok(contacts)
         });
         let reason = match answer {
-            Ok(((contacts, counts), device)) => {
-                return Ok(Detected { contacts, method, device, counts, reason: None });
-            }
+            Ok((contacts, device)) => return Ok(Detected { contacts, method, device, reason: None }),
             Err(DeviceError::Unavailable { reason }) if device == Device::Auto => {
                 Reason::NoGpu(format!("\"{method}\": {reason}"))
             }

@@ -1,0 +1,1 @@
+"""The hard cases, by what makes them hard; `clothsim.stability.catalogue` lists them."""
