@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn a_frame_alone_is_measured_when_sessions_hardly_pay() {
         // A session's average is far below its first frame: nothing to ask.
-        assert!(!sessions(RULE, |_| 10.0, 1.0, 8.0, 100).contains(&1));
+        assert!(!sessions(RULE, |_| 10.0, 1.0, 8.0, MEASURE[0]).contains(&1));
         // 8.2 to 8.5 of 10: asked once for several sessions, and the answer is that they pay.
         let seen = sessions(RULE, |_| 10.0, 8.0, 20.0, 200);
         let asked = seen.iter().filter(|&&n| n == 1).count();
