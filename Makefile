@@ -60,7 +60,7 @@ schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
 
-stability: build ## Run the stability atlas, every case over its whole map (half an hour); writes stability/
+stability: build ## Run the stability atlas, every case over its whole map (minutes); writes stability/
 	$(BIN)/clothsim stability -o stability --overwrite
 
 clean: ## Remove what the targets above made

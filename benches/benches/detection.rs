@@ -2,7 +2,7 @@
 //!
 //! Two scenes by formula. `folded`: a sheet of 25,088 triangles folded onto itself 3 mm apart, with waves, that moves
 //! and shivers, as a draped cloth does. `tangle`: a sheet of 99,856 triangles whose layers pass through each other within one step, with
-//! many contacts. `session`: the coherent sequences of `cloth_benches::sequences`, 100,000 triangles, sessions against frames alone;
+//! many contacts. `frame pair`: that scene with 10,082 to 999,698 triangles, everything from nothing. `session`: the coherent sequences of `cloth_benches::sequences`, 100,000 triangles, sessions against frames alone;
 //! an iteration is so many frames. The scenes of the published ground truth are timed by `compare_ipctk.py`, beside another library.
 
 #![allow(missing_docs, reason = "criterion's macros make public items")]
@@ -86,6 +86,28 @@ fn scenes(c: &mut Criterion) {
     }
 }
 
+/// One frame pair from nothing (topology, tree, detection), as `clothsim.collision.detect` does it, against the size: the tangle with
+/// finer and finer triangles.
+fn sizes(c: &mut Criterion) {
+    let mut group = c.benchmark_group("frame pair");
+    group.sample_size(10);
+    for n in [72, 224, 708] {
+        let scene = folded(n, 0.003, 0.012);
+        for threads in [1, 2] {
+            let pool = pool(threads);
+            let name = format!("{} triangles, {threads} threads", scene.triangles.len());
+            group.bench_function(name, |b| {
+                b.iter(|| {
+                    let mesh = CollisionMesh::single_in(scene.x_t0.len(), &scene.triangles, &pool).unwrap();
+                    let mut bvh = Bvh::new_in(&mesh, black_box(&scene.x_t0), &pool).unwrap();
+                    bvh.detect(&mesh, &query(&scene, 0.0, Mode::Continuous), &pool).unwrap()
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
 /// Frames of a sequence, and vertices of a side of its cloth.
 const FRAMES: u32 = 32;
 const SIDE: usize = 221;
@@ -151,5 +173,5 @@ fn pairs(c: &mut Criterion) {
     }
 }
 
-criterion_group!(detection, scenes, sessions, brute, pairs);
+criterion_group!(detection, scenes, sizes, sessions, brute, pairs);
 criterion_main!(detection);

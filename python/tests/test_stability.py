@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from clothsim.stability.observe import observe
 from clothsim.stability.topology import above, beyond, drumhead, inside, linking_number, order_of_sheets, together
 from clothsim.stability.verdict import Verdict, judge
 from clothsim.stability.worker import run_cell
+from clothsim.study.pool import Job, run_jobs
 
 # Cells of the quick form in which a promise is broken, with the reason; each is to be mended.
 KNOWN: dict[tuple[str, Any, Any], str] = {
@@ -153,7 +156,11 @@ def test_a_cell_has_a_time_limit(tmp_path: Any) -> None:
     assert [c.judged.verdict for c in atlas.cells] == [Verdict.UNKNOWN]
 
 
-def test_an_error_that_nobody_expects_is_a_failure() -> None:
+def test_an_error_that_nobody_expects_is_a_failure(tmp_path: Path) -> None:
+    job = Job(tmp_path / "cell", {"threads": 1}, "clothsim.nowhere")
+    run_jobs([job], None, None, lambda: None)
+    crashed = judge(json.loads((tmp_path / "cell.result").read_bytes()))
+    assert crashed.verdict is Verdict.FAILED and "exit code 1" in crashed.why
     assert judge({"error": "exit code 1", "error_type": "ProcessFailed"}).verdict is Verdict.FAILED
     assert judge({"error": "stage", "error_type": "SolverFailed", "started": True}).verdict is Verdict.FAILED
 

@@ -127,3 +127,14 @@ def test_the_docs_name_every_verdict_and_their_commands_can_be_run() -> None:
         at = dict(parse_values(b) for a, b in itertools.pairwise(words) if a == "--at")
         cases = [w for w in words[2:] if w in {c.name for c in CATALOGUE}]
         assert "--list" in words or Request(cases, at=at).cells()
+
+
+def test_the_committed_atlas_is_of_these_cases() -> None:
+    folder = ROOT / "stability"
+    facts = json.loads((folder / "stability.json").read_text())
+    assert facts["command"].startswith("clothsim stability ") and facts["command"].endswith("-o stability")
+    assert [c["case"] for c in facts["cases"]] == [case.name for case in CATALOGUE]
+    for made in facts["cases"]:
+        assert all((folder / f"{made['case']}.{suffix}").exists() for suffix in ("png", "svg"))
+        kinds = {cell["verdict"] for cell in made["cells"] if cell["promised"]}
+        assert not kinds & {"tunnelled", "intersected", "failed"}, made["case"]

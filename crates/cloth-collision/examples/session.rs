@@ -150,7 +150,7 @@ fn sizes(threads: usize) {
         let mut x_t0 = at(0);
         for frame in 0..FRAMES {
             let x_t1 = at(frame + 1);
-            let (thickness, mode) = (3e-4 * fine, Mode::Continuous);
+            let (thickness, mode) = (1e-3 * fine, Mode::Continuous);
             let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
             let start = Instant::now();
             session.detect(mesh, &query, &pool).unwrap();

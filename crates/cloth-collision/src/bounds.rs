@@ -5,7 +5,7 @@ mod compare;
 use crate::Vec3;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use compare::avx;
-pub(crate) use compare::{Compare, Plain, lanes};
+pub(crate) use compare::{Bounds, Compare, Plain, lanes};
 
 /// Lanes of a [`Block`].
 pub(crate) const LANES: usize = 8;

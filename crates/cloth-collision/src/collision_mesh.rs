@@ -1,7 +1,8 @@
 //! The scene's collision topology: all bodies in one vertex array, features, their owners and the rules for pairs.
 
 use crate::DetectError;
-use cloth_mesh::{NONE, Topology, VertexTriangles};
+use crate::edges::{Edges, edges};
+use cloth_mesh::{NONE, VertexTriangles};
 
 /// What a body is to contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,6 +50,20 @@ impl CollisionMesh {
     /// As [`CollisionMesh::new`].
     pub fn single(vertex_count: usize, triangles: &[[u32; 3]]) -> Result<Self, DetectError> {
         Self::new(&[(Body { dynamic: true, self_collision: true }, vertex_count, triangles)])
+    }
+
+    /// [`CollisionMesh::single`] on a pool: the same mesh for any number of threads.
+    ///
+    /// # Errors
+    /// As [`CollisionMesh::new`].
+    pub fn single_in(
+        vertex_count: usize,
+        triangles: &[[u32; 3]],
+        pool: &rayon::ThreadPool,
+    ) -> Result<Self, DetectError> {
+        let mut mesh = Self::surface(vertex_count, triangles)?;
+        mesh.find_features(Some(pool));
+        Ok(mesh)
     }
 
     /// The given bodies, each with its vertex count and triangles (body-local indices), concatenated in order.
@@ -107,23 +122,26 @@ impl CollisionMesh {
             has_attachments: false,
         };
         if with_features {
-            mesh.find_features();
+            mesh.find_features(None);
         }
         Ok(mesh)
     }
 
-    fn find_features(&mut self) {
-        let Topology { edges, triangle_edges, vertex_triangles, .. } =
-            Topology::new(self.vertex_count, &self.triangles);
-        self.vertex_owner = vec![NONE; self.vertex_count];
-        self.edge_owner = vec![NONE; edges.len()];
-        for t in (0..self.triangles.len()).rev() {
-            for k in 0..3 {
-                self.vertex_owner[self.triangles[t][k] as usize] = t as u32;
-                self.edge_owner[triangle_edges[t][k] as usize] = t as u32;
-            }
-        }
-        (self.edges, self.triangle_edges, self.vertex_triangles) = (edges, triangle_edges, vertex_triangles);
+    fn find_features(&mut self, pool: Option<&rayon::ThreadPool>) {
+        let (vertex_count, triangles) = (self.vertex_count, &self.triangles[..]);
+        let of_vertices = || {
+            let around = VertexTriangles::new(vertex_count, triangles);
+            let owners = (0..vertex_count as u32).map(|v| around.of(v).first().copied().unwrap_or(NONE));
+            (owners.collect(), around)
+        };
+        let of_edges = || edges(vertex_count, triangles, pool);
+        let (of_vertices, of_edges) = match pool {
+            Some(pool) => pool.join(of_vertices, of_edges),
+            None => (of_vertices(), of_edges()),
+        };
+        (self.vertex_owner, self.vertex_triangles) = of_vertices;
+        Edges { list: self.edges, first_triangle: self.edge_owner, of_triangle: self.triangle_edges } =
+            of_edges;
     }
 
     /// Declares that `vertex` is held by `body`: features with this vertex are not tested against that body.

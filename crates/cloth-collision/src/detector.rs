@@ -41,3 +41,19 @@ pub fn detector(name: &str, mesh: &CollisionMesh, x: &[Vec3]) -> Result<Box<dyn 
         _ => Err(DetectError::UnknownDetector { known: KNOWN, got: name.to_owned() }),
     }
 }
+
+/// [`detector`], made on a pool where the method can: the same detector for any number of threads.
+///
+/// # Errors
+/// As [`detector`].
+pub fn detector_in(
+    name: &str,
+    mesh: &CollisionMesh,
+    x: &[Vec3],
+    pool: &rayon::ThreadPool,
+) -> Result<Box<dyn Detector>, DetectError> {
+    match name {
+        "bvh" => Ok(Box::new(Bvh::new_in(mesh, x, pool)?)),
+        _ => detector(name, mesh, x),
+    }
+}

@@ -4,7 +4,7 @@
 mod support;
 
 use cloth_collision::{
-    BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3, detector,
+    BruteForce, Bvh, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3, detector, detector_in,
 };
 use support::{Random, bodies, pool, sheet, soup};
 
@@ -104,6 +104,28 @@ fn rules_of_bodies_and_attachments_agree() {
             let (a, b) = (mesh.vertex_body[v as usize], mesh.vertex_body[corner]);
             assert!(mesh.bodies_meet(a, b) && mesh.attached_to[v as usize] != b);
         }
+    }
+}
+
+#[test]
+fn what_is_made_on_a_pool_is_the_same() {
+    let mut random = Random(8);
+    // More triangles than one task takes.
+    let (x_t0, triangles) = sheet(60, &mut random);
+    let x_t1: Vec<Vec3> = x_t0.iter().map(|x| x + random.vector(0.02)).collect();
+    let mesh = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+    let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.0, mode: Mode::Continuous, active: None };
+    let expected = Bvh::new(&mesh, &x_t0).unwrap().detect(&mesh, &query, &pool(1)).unwrap();
+    for threads in [1, 2, 3] {
+        let pool = pool(threads);
+        assert!(CollisionMesh::single_in(x_t0.len(), &triangles, &pool).unwrap() == mesh);
+        let mut bvh = Bvh::new_in(&mesh, &x_t0, &pool).unwrap();
+        bvh.validate(&mesh).unwrap();
+        let got = bvh.detect(&mesh, &query, &pool).unwrap();
+        assert_eq!(difference(&expected, &got), None, "{threads} threads");
+        assert_eq!(got.stats.broad_phase_tests, expected.stats.broad_phase_tests);
+        let by_name = detector_in("bvh", &mesh, &x_t0, &pool).unwrap().detect(&mesh, &query, &pool).unwrap();
+        assert_eq!(difference(&expected, &by_name), None, "{threads} threads");
     }
 }
 

@@ -61,7 +61,7 @@ pub(crate) fn detect<'py>(
     let triangles = triangles_from(triangles, "triangles", x_t0.len())?;
     let pool = pool(py, threads)?;
     let work = || {
-        let mesh = CollisionMesh::single(x_t0.len(), &triangles)?;
+        let mesh = CollisionMesh::single_in(x_t0.len(), &triangles, &pool)?;
         let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
         let detected = device::detect(&mesh, &query, method, &tuning, device, &pool)?;
         Ok::<_, DeviceError>((mesh, detected))

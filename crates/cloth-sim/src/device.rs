@@ -279,6 +279,6 @@ fn detect_on_cpu(
     pool: &rayon::ThreadPool,
 ) -> Result<Detected, DeviceError> {
     let x: &[Vec3] = query.x_t0;
-    let contacts = collision::detector(method, mesh, x)?.detect(mesh, query, pool)?;
+    let contacts = collision::detector_in(method, mesh, x, pool)?.detect(mesh, query, pool)?;
     Ok(Detected { contacts, method, device: "cpu".to_owned(), reason })
 }

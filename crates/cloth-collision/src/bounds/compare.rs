@@ -1,6 +1,7 @@
 //! Things against the lanes of a block of boxes, by the instructions that the processor has.
 
 use super::{ALL_LANES, Block, LANES, MovingBox};
+use crate::bvh::places::PlacePairs;
 
 /// A box, or the box of a lane where it lies: copied out of there, it would go through memory once more.
 pub(crate) trait Bounds<const ENDS: usize> {
@@ -40,6 +41,11 @@ pub(crate) trait Compare: Copy {
     fn has_corner<const N: usize>(self, vertex: u32, corners: &[[u32; LANES]; N]) -> u32;
     /// Appends a pair for each bit of `hits`, ascending: `first` and the lane's entry of `ids`.
     fn push(self, hits: u32, first: u32, ids: &[u32; LANES], out: &mut Vec<[u32; 2]>);
+    /// Bit per lane: the entry is below `bound`.
+    fn below(self, bound: u32, ids: &[u32; LANES]) -> u32;
+    /// Appends a pair of places for each bit of `hits`, ascending: `own` and `first` plus the lane, the other way round for
+    /// those of `lower`.
+    fn push_places(self, hits: u32, lower: u32, own: u32, first: u32, out: &mut PlacePairs);
 }
 
 /// On any processor.
@@ -75,18 +81,34 @@ impl Compare for Plain {
             out.push([first, ids[lane]]);
         }
     }
+
+    #[inline(always)]
+    fn below(self, bound: u32, ids: &[u32; LANES]) -> u32 {
+        (0..LANES).map(|lane| u32::from(ids[lane] < bound) << lane).sum()
+    }
+
+    #[inline(always)]
+    fn push_places(self, hits: u32, lower: u32, own: u32, first: u32, out: &mut PlacePairs) {
+        for lane in lanes(hits) {
+            let other = first + lane as u32;
+            let pair = if lower >> lane & 1 == 1 { [other, own] } else { [own, other] };
+            out.first.push(pair[0]);
+            out.second.push(pair[1]);
+        }
+    }
 }
 
 /// All lanes at once. A value exists only in functions compiled for AVX2, which the methods are inlined into.
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx {
-    use super::{ALL_LANES, Block, Bounds, Compare, LANES};
+    use super::{ALL_LANES, Block, Bounds, Compare, LANES, PlacePairs};
     use std::arch::x86_64::{
-        _CMP_GT_OQ, _CMP_LT_OQ, _mm_loadl_epi64, _mm256_and_ps, _mm256_castsi256_ps, _mm256_cmp_ps,
-        _mm256_cmpeq_epi32, _mm256_cvtepu8_epi32, _mm256_load_ps, _mm256_loadu_si256, _mm256_movemask_ps,
-        _mm256_or_ps, _mm256_or_si256, _mm256_permute2x128_si256, _mm256_permutevar8x32_epi32,
-        _mm256_set1_epi32, _mm256_set1_ps, _mm256_setzero_ps, _mm256_storeu_si256, _mm256_unpackhi_epi32,
-        _mm256_unpacklo_epi32,
+        _CMP_GT_OQ, _CMP_LT_OQ, _mm_loadl_epi64, _mm256_add_epi32, _mm256_and_ps, _mm256_and_si256,
+        _mm256_blendv_epi8, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cmpgt_epi32,
+        _mm256_cvtepu8_epi32, _mm256_load_ps, _mm256_loadu_si256, _mm256_movemask_ps, _mm256_or_ps,
+        _mm256_or_si256, _mm256_permute2x128_si256, _mm256_permutevar8x32_epi32, _mm256_set1_epi32,
+        _mm256_set1_ps, _mm256_setr_epi32, _mm256_setzero_ps, _mm256_storeu_si256, _mm256_unpackhi_epi32,
+        _mm256_unpacklo_epi32, _mm256_xor_si256,
     };
 
     #[derive(Debug, Clone, Copy)]
@@ -164,6 +186,43 @@ pub(crate) mod avx {
                 out.set_len(out.len() + (hits & ALL_LANES).count_ones() as usize);
             }
         }
+
+        #[inline(always)]
+        fn below(self, bound: u32, ids: &[u32; LANES]) -> u32 {
+            // SAFETY: `self` exists only where the processor has AVX2; 32 readable bytes.
+            unsafe {
+                // The comparison is that of signed numbers.
+                let sign = _mm256_set1_epi32(i32::MIN);
+                let ids = _mm256_xor_si256(_mm256_loadu_si256(ids.as_ptr().cast()), sign);
+                let bound = _mm256_xor_si256(_mm256_set1_epi32(bound as i32), sign);
+                _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpgt_epi32(bound, ids))) as u32
+            }
+        }
+
+        #[inline(always)]
+        fn push_places(self, hits: u32, lower: u32, own: u32, first: u32, out: &mut PlacePairs) {
+            // As `push`: all lanes are written.
+            out.reserve(LANES);
+            let hits = hits & ALL_LANES;
+            let order = &SET_BITS_FIRST[hits as usize];
+            // SAFETY: `self` exists only where the processor has AVX2. There is room for all lanes behind the lists' ends, and
+            // the entries that are kept are written here.
+            unsafe {
+                let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(order.as_ptr().cast()));
+                let lane_bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                let lower = _mm256_and_si256(_mm256_set1_epi32(lower as i32), lane_bits);
+                let lower = _mm256_permutevar8x32_epi32(_mm256_cmpeq_epi32(lower, lane_bits), order);
+                let other = _mm256_add_epi32(_mm256_set1_epi32(first as i32), order);
+                let own = _mm256_set1_epi32(own as i32);
+                let end = out.first.len();
+                let (low, high) =
+                    (_mm256_blendv_epi8(own, other, lower), _mm256_blendv_epi8(other, own, lower));
+                _mm256_storeu_si256(out.first.as_mut_ptr().add(end).cast(), low);
+                _mm256_storeu_si256(out.second.as_mut_ptr().add(end).cast(), high);
+                out.first.set_len(end + hits.count_ones() as usize);
+                out.second.set_len(end + hits.count_ones() as usize);
+            }
+        }
     }
 
     /// For each set of lanes, its lanes ascending.
@@ -237,6 +296,12 @@ mod tests {
                 avx.push(by_box, 7, &corners[0], &mut at_once);
                 assert_eq!(by_one.len(), 1 + by_box.count_ones() as usize);
                 assert_eq!(by_one, at_once);
+                assert_eq!(avx.below(lane as u32, &corners[1]), Plain.below(lane as u32, &corners[1]));
+                let [mut by_one, mut at_once] = [(); 2].map(|()| PlacePairs::default());
+                let lower = small() << 4 | small();
+                Plain.push_places(by_box, lower, 3, 80, &mut by_one);
+                avx.push_places(by_box, lower, 3, 80, &mut at_once);
+                assert_eq!((&by_one.first, &by_one.second), (&at_once.first, &at_once.second));
                 overlaps += by_box.count_ones();
             }
         }

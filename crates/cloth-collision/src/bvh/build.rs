@@ -1,9 +1,8 @@
 //! Building the tree: once per topology.
 
-use super::LEAF_TRIANGLES;
+use super::{LEAF_TRIANGLES, leaves};
 use crate::bounds::{LANES, middle};
 use crate::{CollisionMesh, Vec3};
-use cloth_mesh::NONE;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -14,7 +13,7 @@ use std::ops::Range;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tree {
     pub(crate) leaves: Vec<Leaf>,
-    /// Triangles of each leaf, [`NONE`] in unused lanes.
+    /// Triangles of each leaf, [`cloth_mesh::NONE`] in unused lanes.
     pub(crate) triangle_ids: Vec<[u32; LANES]>,
     /// Their vertices, `[corner][lane]`.
     pub(crate) corners: Vec<[[u32; LANES]; 3]>,
@@ -22,8 +21,16 @@ pub(crate) struct Tree {
     pub(crate) vertex_ids: Vec<[u32; LANES]>,
     /// Edges owned by the triangles of a leaf, in blocks.
     pub(crate) edge_ids: Vec<[u32; LANES]>,
-    /// Their vertices, `[end][lane]`, [`NONE`] in unused lanes.
+    /// Their vertices, `[end][lane]`, [`cloth_mesh::NONE`] in unused lanes.
     pub(crate) edge_ends: Vec<[[u32; LANES]; 2]>,
+    /// The vertices in the order of the leaves that own them: the vertex of each rank.
+    pub(crate) vertex_order: Vec<u32>,
+    /// The rank of each of the vertices in blocks.
+    pub(crate) vertex_ranks: Vec<[u32; LANES]>,
+    /// The ranks of a triangle's corners, by its place: leaf times [`LANES`] plus lane.
+    pub(crate) triangle_ranks: Vec<[u32; 3]>,
+    /// The ranks of an edge's ends, by its place.
+    pub(crate) edge_ranks: Vec<[u32; 2]>,
     /// The blocks above the leaves.
     pub(crate) inner: Vec<Inner>,
     pub(crate) roots: Vec<Root>,
@@ -63,6 +70,10 @@ impl Tree {
             + held(&self.vertex_ids)
             + held(&self.edge_ids)
             + held(&self.edge_ends)
+            + held(&self.vertex_order)
+            + held(&self.vertex_ranks)
+            + held(&self.triangle_ranks)
+            + held(&self.edge_ranks)
             + held(&self.inner)
             + held(&self.roots)
     }
@@ -106,15 +117,10 @@ pub(crate) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::Threa
             _ => arrange(items),
         }
         let first = tree.leaves.len() as u32;
-        let leaf_count = items.len().div_ceil(LEAF_TRIANGLES);
-        tree.leaves.reserve(leaf_count);
-        tree.triangle_ids.reserve(leaf_count);
-        tree.corners.reserve(leaf_count);
-        for leaf in items.chunks(LEAF_TRIANGLES) {
-            push_leaf(mesh, leaf, &mut tree);
-        }
+        leaves::push(mesh, items, &mut tree, pool);
         levels.push((body, first..tree.leaves.len() as u32));
     }
+    leaves::number_vertices(mesh, &mut tree, pool);
     while levels.iter().any(|(_, level)| level.len() > 1) {
         for (_, level) in &mut levels {
             let start = tree.block_count() as u32;
@@ -128,10 +134,11 @@ pub(crate) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::Threa
     tree
 }
 
+/// A triangle on its way to a leaf.
 #[derive(Debug, Clone, Copy)]
-struct Item {
+pub(super) struct Item {
     centroid: [f32; 3],
-    triangle: u32,
+    pub(super) triangle: u32,
 }
 
 fn longest_axis(items: &[Item]) -> usize {
@@ -178,67 +185,5 @@ fn arrange(items: &mut [Item]) {
     } else {
         arrange(left);
         arrange(right);
-    }
-}
-
-fn push_leaf(mesh: &CollisionMesh, items: &[Item], tree: &mut Tree) {
-    let mut triangles = [NONE; LANES];
-    let mut corners = [[NONE; LANES]; 3];
-    let (first_vertex_block, first_edge_block) = (tree.vertex_ids.len() as u32, tree.edge_ids.len() as u32);
-    // A mesh without features has no owners: its leaves hold triangles only.
-    let has_features = !mesh.triangle_edges.is_empty();
-    let (mut vertices, mut edges) = (Features::default(), Features::default());
-    for (lane, item) in items.iter().enumerate() {
-        let t = item.triangle;
-        triangles[lane] = t;
-        for k in 0..3 {
-            let v = mesh.triangles[t as usize][k];
-            corners[k][lane] = v;
-            if has_features {
-                let e = mesh.triangle_edges[t as usize][k];
-                vertices.push_if(mesh.vertex_owner[v as usize] == t, v);
-                edges.push_if(mesh.edge_owner[e as usize] == t, e);
-            }
-        }
-    }
-    vertices.push_blocks(&mut tree.vertex_ids);
-    edges.push_blocks(&mut tree.edge_ids);
-    for ids in &tree.edge_ids[first_edge_block as usize..] {
-        let mut ends = [[NONE; LANES]; 2];
-        for (lane, &e) in ids.iter().enumerate().filter(|&(_, &e)| e != NONE) {
-            [ends[0][lane], ends[1][lane]] = mesh.edges[e as usize];
-        }
-        tree.edge_ends.push(ends);
-    }
-    tree.triangle_ids.push(triangles);
-    tree.corners.push(corners);
-    tree.leaves.push(Leaf {
-        count: items.len() as u32,
-        vertex_blocks: [first_vertex_block, tree.vertex_ids.len() as u32],
-        edge_blocks: [first_edge_block, tree.edge_ids.len() as u32],
-    });
-}
-
-/// Features of one kind that the triangles of a leaf own.
-#[derive(Default)]
-struct Features {
-    ids: [u32; 3 * LEAF_TRIANGLES],
-    count: usize,
-}
-
-impl Features {
-    fn push_if(&mut self, is_owned: bool, id: u32) {
-        if is_owned {
-            self.ids[self.count] = id;
-            self.count += 1;
-        }
-    }
-
-    fn push_blocks(&self, blocks: &mut Vec<[u32; LANES]>) {
-        for chunk in self.ids[..self.count].chunks(LANES) {
-            let mut block = [NONE; LANES];
-            block[..chunk.len()].copy_from_slice(chunk);
-            blocks.push(block);
-        }
     }
 }

@@ -187,7 +187,7 @@ impl Visit<1> for Meetings<'_> {
         leaf_pair::triangles(leaves.tree, leaves.boxes, a, b, &mut self.waiting);
     }
 
-    fn finish(&mut self) {
+    fn finish(&mut self, _: &LeafPairs<'_, 1>) {
         self.flush();
     }
 }

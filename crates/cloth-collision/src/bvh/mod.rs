@@ -1,13 +1,16 @@
 //! Bounding volume hierarchy of fixed topology over the scene's triangles.
 //!
 //! [`build`] splits once, into blocks of eight; [`refit`] follows the motion with boxes at both ends of the step;
-//! [`traverse`] meets the tree with itself and [`leaf_pair`] the features of two leaves, each feature from the one triangle that owns it;
-//! [`narrow`] decides what they yield while it streams by.
+//! [`traverse`] meets the tree with itself, and [`places`] (for detection) or [`leaf_pair`] (for everything else) the features
+//! of two leaves, each feature from the one triangle that owns it; [`narrow`] decides what they yield while it streams by.
 
 pub(crate) mod build;
+mod deciding;
 mod intersections;
 pub(crate) mod leaf_pair;
+mod leaves;
 pub(crate) mod narrow;
+pub(crate) mod places;
 mod proximity;
 pub(crate) mod refit;
 pub(crate) mod traverse;
@@ -17,9 +20,10 @@ use crate::bounds::{LANES, MovingBox, middle};
 use crate::contact::check_positions;
 use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use build::Tree;
+use deciding::Deciding;
 use refit::Boxes;
 use std::time::Instant;
-use traverse::{Streaming, traverse};
+use traverse::traverse;
 
 /// Triangles of a full leaf: one block.
 const LEAF_TRIANGLES: usize = LANES;
@@ -123,15 +127,15 @@ impl Detector for Bvh {
             self.refit_still(mesh, query, pool);
         }
         let fitted = Instant::now();
-        let scene = narrow::Scene::new_in(mesh, query, pool);
-        let visit = || Streaming::new(narrow::Narrow::new(&scene));
+        let scene = narrow::Scene::by_rank(mesh, query, &self.tree.vertex_order, pool);
+        let visit = || Deciding::new(narrow::Narrow::new(&scene));
         let (visits, counts) = if is_moving {
             traverse(&self.tree, &self.moving, mesh, pool, visit)
         } else {
             traverse(&self.tree, &self.still, mesh, pool, visit)
         };
         let traversed = Instant::now();
-        let mut out = narrow::merge(visits.into_iter().map(|v| v.sink));
+        let mut out = pool.install(|| narrow::merge(visits.into_iter().map(|v| v.narrow)));
         out.stats.broad_phase_tests = counts.box_tests;
         out.stats.leaf_pairs = counts.leaf_pairs;
         out.stats.seconds = vec![

@@ -1,7 +1,9 @@
 //! The narrow phase of a traversal: candidates in, contacts out.
 
+use super::build::Tree;
+use super::places::{PlacePairs, Places};
 use super::traverse::{Candidates, Sink};
-use crate::ccd::batch::Batch;
+use crate::ccd::batch::{Batch, Pairs};
 use crate::ccd::instructions::Instructions;
 use crate::ccd::motions::Motions;
 use crate::{CollisionMesh, Contacts, Mode, Query, StencilKind, Vec3};
@@ -24,6 +26,16 @@ impl<'a> Scene<'a> {
     /// [`Scene::new`] on a pool.
     pub(crate) fn new_in(mesh: &'a CollisionMesh, query: &'a Query<'a>, pool: &rayon::ThreadPool) -> Self {
         Self::with(mesh, query, Motions::new_in(start(query), query.x_t1, query.thickness, pool))
+    }
+
+    /// [`Scene::new_in`] for pairs of places: the vertices are numbered by their ranks in the tree.
+    pub(crate) fn by_rank(
+        mesh: &'a CollisionMesh,
+        query: &'a Query<'a>,
+        order: &[u32],
+        pool: &rayon::ThreadPool,
+    ) -> Self {
+        Self::with(mesh, query, Motions::ordered_in(start(query), query.x_t1, order, query.thickness, pool))
     }
 
     /// With these motions of the query's vertices.
@@ -82,44 +94,121 @@ impl<'a> Narrow<'a> {
 impl Narrow<'_> {
     /// Decides pairs of one kind that share no vertex, the lower edge first; `corners` are their vertices.
     pub(crate) fn take_strangers(&mut self, kind: StencilKind, pairs: &[[u32; 2]], corners: &[[u32; 4]]) {
-        let Self { scene, waiting, vertices, .. } = self;
-        if scene.has_exclusions {
-            let split = if kind == StencilKind::VertexTriangle { 1 } else { 2 };
-            for (pair, corners) in pairs.iter().zip(corners) {
-                let (first, second) = corners.split_at(split);
-                if scene.is_wanted(first, second) {
-                    waiting.push(*pair);
-                    vertices.push(*corners);
-                }
-            }
-        } else {
-            waiting.extend_from_slice(pairs);
-            vertices.extend_from_slice(corners);
+        let scene = self.scene;
+        if !scene.has_exclusions {
+            self.decide(kind, corners, |pair| pairs[pair]);
+            return;
         }
-        self.decide(kind);
+        self.waiting.clear();
+        self.vertices.clear();
+        let split = if kind == StencilKind::VertexTriangle { 1 } else { 2 };
+        for (pair, corners) in pairs.iter().zip(corners) {
+            let (first, second) = corners.split_at(split);
+            if scene.is_wanted(first, second) {
+                self.waiting.push(*pair);
+                self.vertices.push(*corners);
+            }
+        }
+        self.decide_waiting(kind);
     }
 
-    /// Decides the waiting pairs: their contacts.
-    fn decide(&mut self, kind: StencilKind) {
-        let Self { scene, waiting, vertices, batch, .. } = self;
-        let left = batch.decide(Instructions::widest(), kind, &scene.motions, vertices);
+    /// Decides pairs, notes their contacts by `name` and counts them.
+    fn decide<P: Pairs + ?Sized>(&mut self, kind: StencilKind, pairs: &P, name: impl Fn(usize) -> [u32; 2]) {
+        let Self { scene, batch, .. } = self;
+        let left = batch.decide(Instructions::widest(), kind, &scene.motions, pairs);
         self.root_searches += left as u64;
         let is_continuous = scene.query.mode == Mode::Continuous;
         let contacts = batch
             .contacts()
-            .map(|(pair, time)| (waiting[pair as usize], if is_continuous { time } else { 1.0 }));
+            .map(|(pair, time)| (name(pair as usize), if is_continuous { time } else { 1.0 }));
         match kind {
             StencilKind::VertexTriangle => {
-                self.candidates_vertex_triangle += waiting.len() as u64;
+                self.candidates_vertex_triangle += pairs.count() as u64;
                 self.vertex_triangle.extend(contacts);
             }
             StencilKind::EdgeEdge => {
-                self.candidates_edge_edge += waiting.len() as u64;
+                self.candidates_edge_edge += pairs.count() as u64;
                 self.edge_edge.extend(contacts);
             }
         }
-        waiting.clear();
-        vertices.clear();
+    }
+
+    /// Decides the waiting pairs.
+    fn decide_waiting(&mut self, kind: StencilKind) {
+        let (waiting, vertices) = (std::mem::take(&mut self.waiting), std::mem::take(&mut self.vertices));
+        self.decide(kind, &vertices[..], |pair| waiting[pair]);
+        (self.waiting, self.vertices) = (waiting, vertices);
+    }
+
+    /// Gives back the memory of what waits; nothing does.
+    pub(crate) fn release(&mut self) {
+        (self.waiting, self.vertices, self.batch) = (vec![], vec![], Batch::default());
+    }
+
+    /// Takes pairs of places out and decides them. The scene is one by rank, of this tree.
+    pub(crate) fn take_places(&mut self, tree: &Tree, places: &mut Places) {
+        let Places { vertex_triangle, edge_edge } = places;
+        let (scene, mesh) = (self.scene, self.scene.mesh);
+        let (vertices, triangles) = (tree.vertex_ids.as_flattened(), tree.triangle_ids.as_flattened());
+        let name = |pair: [u32; 2]| [vertices[pair[0] as usize], triangles[pair[1] as usize]];
+        if scene.has_exclusions {
+            vertex_triangle.retain(|pair| {
+                let [v, t] = name(pair);
+                scene.is_wanted(&[v], &mesh.triangles[t as usize])
+            });
+        }
+        let pairs =
+            VertexTrianglePlaces { ranks: tree.vertex_ranks.as_flattened(), tree, pairs: vertex_triangle };
+        self.decide(StencilKind::VertexTriangle, &pairs, |pair| name(pairs.pairs.get(pair)));
+        vertex_triangle.clear();
+
+        let edges = tree.edge_ids.as_flattened();
+        let name = |pair: [u32; 2]| pair.map(|place| edges[place as usize]);
+        if scene.has_exclusions {
+            edge_edge.retain(|pair| {
+                let [e, f] = name(pair).map(|e| &mesh.edges[e as usize]);
+                scene.is_wanted(e, f)
+            });
+        }
+        let pairs = EdgeEdgePlaces { tree, pairs: edge_edge };
+        self.decide(StencilKind::EdgeEdge, &pairs, |pair| name(pairs.pairs.get(pair)));
+        edge_edge.clear();
+    }
+}
+
+struct VertexTrianglePlaces<'a> {
+    ranks: &'a [u32],
+    tree: &'a Tree,
+    pairs: &'a PlacePairs,
+}
+
+impl Pairs for VertexTrianglePlaces<'_> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.pairs.len()
+    }
+    #[inline(always)]
+    fn vertices(&self, pair: usize) -> [u32; 4] {
+        let [v, t] = self.pairs.get(pair);
+        let [a, b, c] = self.tree.triangle_ranks[t as usize];
+        [self.ranks[v as usize], a, b, c]
+    }
+}
+
+struct EdgeEdgePlaces<'a> {
+    tree: &'a Tree,
+    pairs: &'a PlacePairs,
+}
+
+impl Pairs for EdgeEdgePlaces<'_> {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.pairs.len()
+    }
+    #[inline(always)]
+    fn vertices(&self, pair: usize) -> [u32; 4] {
+        let [[a, b], [c, d]] = self.pairs.get(pair).map(|place| self.tree.edge_ranks[place as usize]);
+        [a, b, c, d]
     }
 }
 
@@ -145,7 +234,7 @@ impl Sink for Narrow<'_> {
         }
         waiting.truncate(count);
         vertices.truncate(count);
-        self.decide(StencilKind::VertexTriangle);
+        self.decide_waiting(StencilKind::VertexTriangle);
 
         let Self { scene, waiting, vertices, .. } = self;
         let mut count = 0;
@@ -162,7 +251,7 @@ impl Sink for Narrow<'_> {
         }
         waiting.truncate(count);
         vertices.truncate(count);
-        self.decide(StencilKind::EdgeEdge);
+        self.decide_waiting(StencilKind::EdgeEdge);
     }
 }
 
@@ -171,37 +260,43 @@ pub(crate) fn merge<'a>(sinks: impl Iterator<Item = Narrow<'a>>) -> Contacts {
     let mut out = Contacts::default();
     let (mut vertex_triangle, mut edge_edge) = (vec![], vec![]);
     for sink in sinks {
-        vertex_triangle.extend(sink.vertex_triangle);
-        edge_edge.extend(sink.edge_edge);
         out.stats.candidates_vertex_triangle += sink.candidates_vertex_triangle;
         out.stats.candidates_edge_edge += sink.candidates_edge_edge;
         out.stats.root_searches += sink.root_searches;
+        vertex_triangle.push(sink.vertex_triangle);
+        edge_edge.push(sink.edge_edge);
     }
-    sort_by_pair(&mut vertex_triangle);
-    sort_by_pair(&mut edge_edge);
-    (out.vertex_triangle, out.time_vertex_triangle) = vertex_triangle.into_iter().unzip();
-    (out.edge_edge, out.time_edge_edge) = edge_edge.into_iter().unzip();
+    let sorted = |parts: Vec<Vec<([u32; 2], f64)>>| -> (Vec<[u32; 2]>, Vec<f64>) {
+        sort_by_pair(parts.concat()).into_iter().unzip()
+    };
+    // The smaller part beside the larger one, where there is a pool to do so.
+    let (vertex_triangle, edge_edge) = match rayon::current_thread_index() {
+        Some(_) => rayon::join(|| sorted(vertex_triangle), || sorted(edge_edge)),
+        None => (sorted(vertex_triangle), sorted(edge_edge)),
+    };
+    (out.vertex_triangle, out.time_vertex_triangle) = vertex_triangle;
+    (out.edge_edge, out.time_edge_edge) = edge_edge;
     out
 }
 
 /// Sorts contacts by their pairs, each of which is there once.
-fn sort_by_pair(contacts: &mut Vec<([u32; 2], f64)>) {
+fn sort_by_pair(mut contacts: Vec<([u32; 2], f64)>) -> Vec<([u32; 2], f64)> {
     let first_count = contacts.iter().map(|c| c.0[0] as usize + 1).max().unwrap_or(0);
     // Few contacts among many features: not worth a look at each feature.
     if first_count > 8 * contacts.len() {
         contacts.sort_unstable_by_key(|c| c.0);
-        return;
+        return contacts;
     }
     // A place for each by its first feature, then an order among the few with the same one.
     let mut place = vec![0_u32; first_count + 1];
-    for contact in &*contacts {
+    for contact in &contacts {
         place[contact.0[0] as usize + 1] += 1;
     }
     for k in 0..first_count {
         place[k + 1] += place[k];
     }
     let mut sorted = vec![([0; 2], 0.0); contacts.len()];
-    for &contact in &*contacts {
+    for &contact in &contacts {
         let place = &mut place[contact.0[0] as usize];
         sorted[*place as usize] = contact;
         *place += 1;
@@ -209,7 +304,7 @@ fn sort_by_pair(contacts: &mut Vec<([u32; 2], f64)>) {
     for same in sorted.chunk_by_mut(|a, b| a.0[0] == b.0[0]) {
         same.sort_unstable_by_key(|c| c.0[1]);
     }
-    *contacts = sorted;
+    sorted
 }
 
 #[cfg(test)]
@@ -224,12 +319,11 @@ mod tests {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
                 (state >> 8) % below
             };
-            let mut contacts: Vec<_> =
+            let contacts: Vec<_> =
                 (0..count).map(|k| ([random(features), 10_000 * random(9) + k], f64::from(k))).collect();
             let mut expected = contacts.clone();
             expected.sort_by_key(|c| c.0);
-            sort_by_pair(&mut contacts);
-            assert_eq!(contacts, expected);
+            assert_eq!(sort_by_pair(contacts), expected);
         }
     }
 }

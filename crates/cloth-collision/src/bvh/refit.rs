@@ -52,12 +52,14 @@ impl<const ENDS: usize> Boxes<ENDS> {
         pool: &rayon::ThreadPool,
     ) {
         let leaf_count = tree.leaves.len();
-        self.vertices.resize(mesh.vertex_count, MovingBox::EMPTY);
-        self.blocks.resize(tree.block_count(), Block::EMPTY);
-        self.hulls.resize(tree.block_count(), MovingBox::EMPTY);
-        self.lanes.resize(tree.block_count(), BlockLanes::default());
-        self.vertex_blocks.resize(tree.vertex_ids.len(), Block::EMPTY);
-        self.edge_blocks.resize(tree.edge_ids.len(), Block::EMPTY);
+        pool.install(|| {
+            resize(&mut self.vertices, mesh.vertex_count, MovingBox::EMPTY);
+            resize(&mut self.blocks, tree.block_count(), Block::EMPTY);
+            resize(&mut self.hulls, tree.block_count(), MovingBox::EMPTY);
+            resize(&mut self.lanes, tree.block_count(), BlockLanes::default());
+            resize(&mut self.vertex_blocks, tree.vertex_ids.len(), Block::EMPTY);
+            resize(&mut self.edge_blocks, tree.edge_ids.len(), Block::EMPTY);
+        });
 
         let Self { vertices, blocks, hulls, vertex_blocks, edge_blocks, .. } = self;
         pool.install(|| {
@@ -67,9 +69,9 @@ impl<const ENDS: usize> Boxes<ENDS> {
                 }
             });
             let vertices = &*vertices;
-            fill(&mut blocks[..leaf_count], &tree.triangle_ids, vertices, |t| mesh.triangles[t]);
-            fill(edge_blocks, &tree.edge_ids, vertices, |e| mesh.edges[e]);
-            fill(vertex_blocks, &tree.vertex_ids, vertices, |v| [v as u32]);
+            fill(&mut blocks[..leaf_count], &tree.corners, vertices);
+            fill(edge_blocks, &tree.edge_ends, vertices);
+            fill(vertex_blocks, one_corner(&tree.vertex_ids), vertices);
             hulls[..leaf_count].par_chunks_mut(BLOCK_CHUNK).zip(blocks.par_chunks(BLOCK_CHUNK)).for_each(
                 |(hulls, blocks)| {
                     for (hull, block) in hulls.iter_mut().zip(blocks) {
@@ -107,19 +109,27 @@ impl<const ENDS: usize> Boxes<ENDS> {
     }
 
     /// Fits a leaf to the boxes of its vertices, which have changed.
-    pub(crate) fn refit_leaf(&mut self, tree: &Tree, mesh: &CollisionMesh, leaf: usize) {
+    pub(crate) fn refit_leaf(&mut self, tree: &Tree, leaf: usize) {
         let Self { vertices, blocks, hulls, vertex_blocks, edge_blocks, .. } = self;
         let range = |[first, end]: [u32; 2]| first as usize..end as usize;
         let of_vertices = range(tree.leaves[leaf].vertex_blocks);
         let of_edges = range(tree.leaves[leaf].edge_blocks);
-        fill_one(&mut blocks[leaf], &tree.triangle_ids[leaf], vertices, |t| mesh.triangles[t]);
+        fill_one(&mut blocks[leaf], &tree.corners[leaf], vertices);
         for k in of_vertices {
-            fill_one(&mut vertex_blocks[k], &tree.vertex_ids[k], vertices, |v| [v as u32]);
+            fill_one(&mut vertex_blocks[k], std::array::from_ref(&tree.vertex_ids[k]), vertices);
         }
         for k in of_edges {
-            fill_one(&mut edge_blocks[k], &tree.edge_ids[k], vertices, |e| mesh.edges[e]);
+            fill_one(&mut edge_blocks[k], &tree.edge_ends[k], vertices);
         }
         hulls[leaf] = blocks[leaf].hull();
+    }
+}
+
+/// Makes room on all threads of the pool: pages that are touched for the first time cost more than what is written there.
+fn resize<T: Copy + Send + Sync>(list: &mut Vec<T>, len: usize, value: T) {
+    if list.len() != len {
+        list.clear();
+        list.par_extend(rayon::iter::repeat_n(value, len));
     }
 }
 
@@ -131,31 +141,34 @@ pub(crate) fn bits(lanes: [bool; LANES]) -> u32 {
     lanes.iter().enumerate().map(|(lane, &set)| u32::from(set) << lane).sum()
 }
 
+/// Features of one vertex.
+fn one_corner(ids: &[[u32; LANES]]) -> &[[[u32; LANES]; 1]] {
+    ids.as_chunks::<1>().0
+}
+
 fn fill<const ENDS: usize, const N: usize>(
     blocks: &mut [Block<ENDS>],
-    ids: &[[u32; LANES]],
+    corners: &[[[u32; LANES]; N]],
     vertices: &[MovingBox<ENDS>],
-    corners: impl Fn(usize) -> [u32; N] + Sync,
 ) {
-    blocks.par_chunks_mut(BLOCK_CHUNK).zip(ids.par_chunks(BLOCK_CHUNK)).for_each(|(blocks, ids)| {
-        for (block, ids) in blocks.iter_mut().zip(ids) {
-            fill_one(block, ids, vertices, &corners);
+    blocks.par_chunks_mut(BLOCK_CHUNK).zip(corners.par_chunks(BLOCK_CHUNK)).for_each(|(blocks, corners)| {
+        for (block, corners) in blocks.iter_mut().zip(corners) {
+            fill_one(block, corners, vertices);
         }
     });
 }
 
+/// Fits a block to the boxes of its features' vertices, `[corner][lane]`.
 #[inline]
 fn fill_one<const ENDS: usize, const N: usize>(
     block: &mut Block<ENDS>,
-    ids: &[u32; LANES],
+    corners: &[[u32; LANES]; N],
     vertices: &[MovingBox<ENDS>],
-    corners: impl Fn(usize) -> [u32; N],
 ) {
-    for (lane, &id) in ids.iter().enumerate().filter(|&(_, &id)| id != NONE) {
-        let corners = corners(id as usize);
-        let mut bounds = vertices[corners[0] as usize];
-        for &v in &corners[1..] {
-            bounds.grow(&vertices[v as usize]);
+    for lane in (0..LANES).filter(|&lane| corners[0][lane] != NONE) {
+        let mut bounds = vertices[corners[0][lane] as usize];
+        for corner in &corners[1..] {
+            bounds.grow(&vertices[corner[lane] as usize]);
         }
         block.set(lane, &bounds);
     }

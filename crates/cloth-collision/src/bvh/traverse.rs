@@ -29,7 +29,7 @@ pub(crate) trait Visit<const ENDS: usize>: Send {
     /// Two leaves whose boxes overlap (or one, twice).
     fn leaf_pair(&mut self, leaves: &LeafPairs<'_, ENDS>, a: u32, b: u32);
     /// There is no further pair.
-    fn finish(&mut self);
+    fn finish(&mut self, leaves: &LeafPairs<'_, ENDS>);
 }
 
 /// The leaves that a [`Visit`] is called with.
@@ -65,7 +65,7 @@ impl<const ENDS: usize, S: Sink> Visit<ENDS> for Streaming<S> {
         }
     }
 
-    fn finish(&mut self) {
+    fn finish(&mut self, _: &LeafPairs<'_, ENDS>) {
         self.sink.take(&mut self.candidates);
     }
 }
@@ -172,7 +172,7 @@ impl<const ENDS: usize> Walk<'_, ENDS> {
                 visit.leaf_pair(&self.leaves, pair.0, pair.1);
             }
         }
-        visit.finish();
+        visit.finish(&self.leaves);
         counts
     }
 }

@@ -32,6 +32,7 @@ impl Bvh {
         if let Some(v) = (0..seen.len()).find(|&v| seen[v] != u32::from(mesh.vertex_owner[v] != NONE)) {
             return Err(format!("vertex {v} is in {} leaves", seen[v]));
         }
+        self.validate_ranks(mesh)?;
         let mut parents = vec![0u32; tree.block_count()];
         for root in &tree.roots {
             parents[root.block as usize] += 1;
@@ -48,6 +49,34 @@ impl Bvh {
         }
         self.moving.validate(tree, mesh)?;
         self.still.validate(tree, mesh)
+    }
+}
+
+impl Bvh {
+    /// Whether each place has the ranks of its feature's vertices.
+    fn validate_ranks(&self, mesh: &CollisionMesh) -> Result<(), String> {
+        let tree = &self.tree;
+        let vertex = |rank: u32| tree.vertex_order[rank as usize];
+        let ids = |blocks: &[[u32; LANES]]| -> Vec<(usize, usize)> {
+            let used = blocks.as_flattened().iter().enumerate().filter(|p| *p.1 != NONE);
+            used.map(|(place, &id)| (place, id as usize)).collect()
+        };
+        for (place, v) in ids(&tree.vertex_ids) {
+            if vertex(tree.vertex_ranks.as_flattened()[place]) != v as u32 {
+                return Err(format!("rank of vertex {v}"));
+            }
+        }
+        for (place, t) in ids(&tree.triangle_ids) {
+            if tree.triangle_ranks[place].map(vertex) != mesh.triangles[t] {
+                return Err(format!("ranks of triangle {t}"));
+            }
+        }
+        for (place, e) in ids(&tree.edge_ids) {
+            if tree.edge_ranks[place].map(vertex) != mesh.edges[e] {
+                return Err(format!("ranks of edge {e}"));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -117,6 +146,9 @@ mod tests {
         assert!(fault(&|b| b.tree.triangle_ids[0][0] = b.tree.triangle_ids[1][0]).contains("triangle"));
         assert!(fault(&|b| b.tree.edge_ids[0][0] = cloth_mesh::NONE).contains("edge"));
         assert!(fault(&|b| b.tree.vertex_ids[0][0] = cloth_mesh::NONE).contains("vertex"));
+        assert!(fault(&|b| b.tree.vertex_order.swap(0, 1)).contains("rank of vertex"));
+        assert!(fault(&|b| b.tree.edge_ranks.swap(0, 1)).contains("ranks of edge"));
+        assert!(fault(&|b| b.tree.triangle_ranks.swap(0, 1)).contains("ranks of triangle"));
         assert!(fault(&|b| b.tree.inner[0].first += 1).contains("parents"));
         assert!(fault(&|b| b.tree.inner[0].count = 0).contains("children"));
         assert!(fault(&|b| b.still.hulls[1].hi[0][0] += 1e6).contains("box"));

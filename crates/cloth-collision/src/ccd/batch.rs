@@ -4,118 +4,158 @@ use super::coarse;
 use super::edge_edge::EdgeEdgeMotion;
 use super::filter;
 use super::instructions::{Instructions, Kernel};
-use super::lanes::{Doubles, MAX_SINGLES, Mask, Singles, SmallRow, Vector};
+use super::lanes::{Doubles, MAX_DOUBLES, MAX_SINGLES, Mask, Singles, SmallRow, Vector};
 use super::march::{NEVER, march, points};
 use super::motions::Motions;
 use super::vertex_triangle::VertexTriangleMotion;
 use crate::StencilKind;
 
-/// The pairs of a batch, by number; its memory is used again.
+/// The pairs to decide, by number.
+pub(crate) trait Pairs {
+    fn count(&self) -> usize;
+    /// The four vertices of a pair, as the [`Motions`] number them. Implementations are `#[inline(always)]`.
+    fn vertices(&self, pair: usize) -> [u32; 4];
+}
+
+impl Pairs for [[u32; 4]] {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.len()
+    }
+    #[inline(always)]
+    fn vertices(&self, pair: usize) -> [u32; 4] {
+        self[pair]
+    }
+}
+
+/// The pairs of a batch that the filters have left; its memory is used again.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
-    pairs: Vec<u32>,
+    /// Their numbers.
+    numbers: Vec<u32>,
+    vertices: Vec<[u32; 4]>,
     times: Vec<f64>,
+    /// Those that wait for an answer, by their place here.
+    waiting: Vec<u32>,
 }
 
 impl Batch {
-    /// Decides the pairs with these `vertices`, with the single-pair tests' answers. Returns how many the filters have
-    /// left; [`Batch::contacts`] are among these.
+    /// Decides the pairs, with the single-pair tests' answers. Returns how many the filters have left;
+    /// [`Batch::contacts`] are among these.
     #[inline]
-    pub(crate) fn decide(
+    pub(crate) fn decide<P: Pairs + ?Sized>(
         &mut self,
         instructions: Instructions,
         kind: StencilKind,
         motions: &Motions,
-        vertices: &[[u32; 4]],
+        pairs: &P,
     ) -> usize {
-        self.times.clear();
-        self.times.resize(vertices.len(), NEVER);
-        instructions.run(Decide { kind, motions, vertices, batch: self })
+        instructions.run(Decide { kind, motions, pairs, batch: self })
     }
 
     /// The pairs in contact, in their order, with their times.
     pub(crate) fn contacts(&self) -> impl Iterator<Item = (u32, f64)> {
-        self.times.iter().enumerate().filter(|t| *t.1 != NEVER).map(|(pair, &t)| (pair as u32, t))
+        self.numbers.iter().copied().zip(self.times.iter().copied()).filter(|c| c.1 != NEVER)
     }
 }
 
-struct Decide<'b> {
+struct Decide<'b, P: ?Sized> {
     kind: StencilKind,
     motions: &'b Motions,
-    vertices: &'b [[u32; 4]],
+    pairs: &'b P,
     batch: &'b mut Batch,
 }
 
-impl Kernel for Decide<'_> {
+impl<P: Pairs + ?Sized> Kernel for Decide<'_, P> {
     type Answer = usize;
 
     #[inline(always)]
     fn run<D: Doubles, S: Singles>(self) -> usize {
-        let Self { kind, motions, vertices, batch: Batch { pairs, times } } = self;
-        let thickness = motions.thickness;
-        coarse_filter::<S>(kind, motions, vertices, pairs);
-        fine_filter::<D>(kind, motions, vertices, pairs);
-        let left = pairs.len();
-        let rows = |pair: u32| motions.rows(&vertices[pair as usize]);
+        let Self { kind, motions, pairs, batch } = self;
+        batch.coarse_filter::<S, P>(kind, motions, pairs);
+        batch.fine_filter::<D>(kind, motions);
+        let Batch { vertices, times, waiting, .. } = batch;
+        let left = vertices.len();
+        waiting.clear();
+        waiting.extend(0..left as u32);
+        times.clear();
+        times.resize(left, NEVER);
+        let rows = |place: u32| motions.rows(&vertices[place as usize]);
         match kind {
             StencilKind::VertexTriangle => {
-                march::<D, VertexTriangleMotion<D>, 3>(rows, thickness, pairs, times);
+                march::<D, VertexTriangleMotion<D>, 3>(rows, motions.thickness, waiting, times);
             }
-            StencilKind::EdgeEdge => march::<D, EdgeEdgeMotion<D>, 4>(rows, thickness, pairs, times),
+            StencilKind::EdgeEdge => {
+                march::<D, EdgeEdgeMotion<D>, 4>(rows, motions.thickness, waiting, times);
+            }
         }
         left
     }
 }
 
-/// Lists the pairs that [`coarse`] does not show to be apart.
-#[inline(always)]
-fn coarse_filter<S: Singles>(
-    kind: StencilKind,
-    motions: &Motions,
-    vertices: &[[u32; 4]],
-    pairs: &mut Vec<u32>,
-) {
-    static ORIGIN: SmallRow = [0.0; 8];
-    pairs.clear();
-    pairs.resize(vertices.len(), 0);
-    let mut kept = 0;
-    let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
-    for (group, vertices) in vertices.chunks(S::COUNT).enumerate() {
-        for lane in 0..S::COUNT {
-            rows[lane] = motions.small_rows(&vertices[lane.min(vertices.len() - 1)]);
+// Every pair is written, and the next one over it if it is apart: no branch on what is hard to foresee.
+impl Batch {
+    /// Lists the pairs that [`coarse`] does not show to be apart.
+    #[inline(always)]
+    fn coarse_filter<S: Singles, P: Pairs + ?Sized>(
+        &mut self,
+        kind: StencilKind,
+        motions: &Motions,
+        pairs: &P,
+    ) {
+        static ORIGIN: SmallRow = [0.0; 8];
+        let Self { numbers, vertices, .. } = self;
+        let count = pairs.count();
+        numbers.clear();
+        numbers.resize(count, 0);
+        vertices.clear();
+        vertices.resize(count, [0; 4]);
+        let mut kept = 0;
+        let mut first = 0;
+        let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
+        let mut group = [[0; 4]; MAX_SINGLES];
+        while first < count {
+            let lanes = S::COUNT.min(count - first);
+            for lane in 0..S::COUNT {
+                group[lane] = pairs.vertices(first + lane.min(lanes - 1));
+                rows[lane] = motions.small_rows(&group[lane]);
+            }
+            let mut points = [Vector([S::splat(0.0); 3]); 8];
+            for k in 0..4 {
+                [points[k], points[k + 4]] = S::gather(&rows, k);
+            }
+            let apart = coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT).bits();
+            for lane in 0..lanes {
+                (numbers[kept], vertices[kept]) = ((first + lane) as u32, group[lane]);
+                kept += (!apart >> lane & 1) as usize;
+            }
+            first += lanes;
         }
-        let mut points = [Vector([S::splat(0.0); 3]); 8];
-        for k in 0..4 {
-            [points[k], points[k + 4]] = S::gather(&rows, k);
-        }
-        let apart = coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT).bits();
-        for lane in 0..vertices.len() {
-            pairs[kept] = (group * S::COUNT + lane) as u32;
-            kept += (!apart >> lane & 1) as usize;
-        }
+        numbers.truncate(kept);
+        vertices.truncate(kept);
     }
-    pairs.truncate(kept);
-}
 
-/// Keeps the pairs that [`filter`] does not show to be apart.
-#[inline(always)]
-fn fine_filter<D: Doubles>(
-    kind: StencilKind,
-    motions: &Motions,
-    vertices: &[[u32; 4]],
-    pairs: &mut Vec<u32>,
-) {
-    let rows = |pair: u32| motions.rows(&vertices[pair as usize]);
-    let (mut kept, mut first) = (0, 0);
-    while first < pairs.len() {
-        let count = D::COUNT.min(pairs.len() - first);
-        let points = points::<D>(&rows, &pairs[first..first + count]);
-        let apart = filter::apart::<D>(kind, &points, motions.thickness).bits();
-        for lane in 0..count {
-            pairs[kept] = pairs[first + lane];
-            kept += (!apart >> lane & 1) as usize;
+    /// Keeps the pairs that [`filter`] does not show to be apart.
+    #[inline(always)]
+    fn fine_filter<D: Doubles>(&mut self, kind: StencilKind, motions: &Motions) {
+        let Self { numbers, vertices, .. } = self;
+        let (mut kept, mut first) = (0, 0);
+        while first < vertices.len() {
+            let count = D::COUNT.min(vertices.len() - first);
+            let rows = |place: u32| motions.rows(&vertices[place as usize]);
+            let mut places = [0; MAX_DOUBLES];
+            for lane in 0..count {
+                places[lane] = (first + lane) as u32;
+            }
+            let points = points::<D>(&rows, &places[..count]);
+            let apart = filter::apart::<D>(kind, &points, motions.thickness).bits();
+            for lane in 0..count {
+                (numbers[kept], vertices[kept]) = (numbers[first + lane], vertices[first + lane]);
+                kept += (!apart >> lane & 1) as usize;
+            }
+            first += count;
         }
-        first += count;
+        numbers.truncate(kept);
+        vertices.truncate(kept);
     }
-    pairs.truncate(kept);
 }

@@ -12,9 +12,11 @@ pub(crate) struct Cubic<L> {
 
 /// Steps of Bézier clipping before the present bound is returned as it stands.
 const MAX_CLIPS: usize = 64;
-/// Steps of Newton's method; five are usual.
-const MAX_NEWTON: usize = 16;
-/// A clip that moves on by less than this fraction of the step has arrived, and a root found by Newton's method is
+/// Steps of Halley's method; three are usual.
+const MAX_STEPS: usize = 16;
+/// The method triples the digits: a step of this size lands within about its cube of the root.
+const LAST_STEP: f64 = 1e-4;
+/// A clip that moves on by less than this fraction of the step has arrived, and a root found by Halley's method is
 /// approached to it.
 const ROOT_STEP: f64 = 1e-10;
 
@@ -43,9 +45,9 @@ impl<L: Lanes> Cubic<L> {
         if !open.any() {
             return (rootless, t);
         }
-        let (found, x) = approach(&c, open);
-        let bound = L::select(found, t + x * (L::splat(1.0) - t), t);
-        let hard = open & !found;
+        let Approach { found, none, x } = approach(&c, open);
+        let (rootless, bound) = (rootless | none, L::select(found, t + x * (L::splat(1.0) - t), t));
+        let hard = open & !(found | none);
         if !hard.any() {
             return (rootless, bound);
         }
@@ -110,46 +112,89 @@ fn all_positive<L: Lanes>(c: &[L; 4]) -> L::Mask {
     c[0].greater(zero) & c[1].greater(zero) & c[2].greater(zero) & c[3].greater(zero)
 }
 
-/// Where `wanted` and found: a parameter shortly before a root of the polynomial with coefficients `c`, c0 > 0 ≥ c3, up
-/// to which it certainly has none. Not all are found in this simple way.
+/// What [`approach`] has found.
+struct Approach<L: Lanes> {
+    /// Where [`Approach::x`] is a parameter shortly before the first root.
+    found: L::Mask,
+    /// Where there is no root.
+    none: L::Mask,
+    x: L,
+}
+
+/// Where `wanted`, the first root of the polynomial with coefficients `c`, c0 > 0; what it says it has certified, but it
+/// does not always find an answer.
+///
+/// With c3 > 0 the polynomial has no root or two, on both sides of its minimum at m: a root is looked for in \[0, m\].
 #[inline(always)]
-fn approach<L: Lanes>(c: &[L; 4], wanted: L::Mask) -> (L::Mask, L) {
-    let (zero, half, two, three) = (L::splat(0.0), L::splat(0.5), L::splat(2.0), L::splat(3.0));
-    let wanted = wanted & !c[3].greater(zero);
-    let mut running = wanted;
+fn approach<L: Lanes>(c: &[L; 4], wanted: L::Mask) -> Approach<L> {
+    let (zero, one, half) = (L::splat(0.0), L::splat(1.0), L::splat(0.5));
+    let (two, three) = (L::splat(2.0), L::splat(3.0));
     let slopes =
         [three * (c[1] - c[0]), three * (c[2] - two * c[1] + c[0]), c[3] - three * (c[2] - c[1]) - c[0]];
-    let (mut lo, mut hi, mut x) = (zero, L::splat(1.0), c[0] / (c[0] - c[3]));
-    for _ in 0..MAX_NEWTON {
+    let at = |x: L| c[0] + x * (slopes[0] + x * (slopes[1] + x * slopes[2]));
+    let (mut end, mut last, mut none) = (one, c[3], zero.greater(zero));
+    let returns = wanted & c[3].greater(zero);
+    if returns.any() {
+        let middle = minimum(&slopes);
+        let is_between = middle.greater(zero) & one.greater(middle);
+        // Without a minimum in between, half is as good as any other parameter.
+        let middle = L::select(is_between, middle, half);
+        let value = at(middle);
+        end = L::select(returns, middle, end);
+        last = L::select(returns, value, last);
+        let stays = returns & value.greater(zero);
+        if stays.any() {
+            let [left, right] = split(c, middle);
+            none = stays & is_positive(&left, stays) & is_positive(&right, stays);
+        }
+    }
+    // The coefficient at the end decides where it was used as it is, the value elsewhere.
+    let wanted = wanted & !last.greater(zero);
+    let (mut lo, mut hi, mut x) = (zero, end, end * c[0] / (c[0] - last));
+    let mut running = wanted;
+    for _ in 0..MAX_STEPS {
         if !running.any() {
             break;
         }
-        let value = c[0] + x * (slopes[0] + x * (slopes[1] + x * slopes[2]));
+        let value = at(x);
         let slope = slopes[0] + x * (two * slopes[1] + x * three * slopes[2]);
+        let bend = slopes[1] + x * three * slopes[2];
         let is_before = value.greater(zero);
         lo = L::select(is_before, x, lo);
         hi = L::select(is_before, hi, x);
-        let next = x - value / slope;
+        let next = x - value * slope / (slope * slope - value * bend);
         let next = L::select(next.greater(lo) & hi.greater(next), next, half * (lo + hi));
-        let arrived = L::splat(0.1 * ROOT_STEP).greater((next - x).abs());
+        let arrived = L::splat(LAST_STEP).greater((next - x).abs());
         x = L::select(running, next, x);
         running = running & !arrived;
     }
-    let end = x - L::splat(ROOT_STEP);
-    let found = wanted & end.greater(zero);
-    (found & is_positive_until(c, end, found), end)
+    let x = x - L::splat(ROOT_STEP);
+    let found = wanted & x.greater(zero);
+    let [left, _] = split(c, x);
+    Approach { found: found & is_positive(&left, found), none, x }
 }
 
-/// Where `wanted`: whether the coefficients on \[0, x\] are positive, or those on both halves of it.
+/// Where the polynomial c0 + s0 x + s1 x² + s2 x³ has its local minimum; no number or any number where it has none.
 #[inline(always)]
-fn is_positive_until<L: Lanes>(c: &[L; 4], x: L, wanted: L::Mask) -> L::Mask {
-    let [left, _] = split(c, x);
-    let is_positive = all_positive(&left);
-    if !(wanted & !is_positive).any() {
-        return is_positive;
+fn minimum<L: Lanes>(slopes: &[L; 3]) -> L {
+    let zero = L::splat(0.0);
+    let thrice = L::splat(3.0) * slopes[2];
+    let root = (slopes[1] * slopes[1] - thrice * slopes[0]).sqrt();
+    // Of the two forms of the solution the one that adds numbers of one sign.
+    let is_late = slopes[1].greater(zero);
+    let below = L::select(is_late, zero - slopes[1] - root, thrice);
+    L::select(is_late, slopes[0], root - slopes[1]) / below
+}
+
+/// Where `wanted`: whether the coefficients are positive, or those on both halves.
+#[inline(always)]
+fn is_positive<L: Lanes>(c: &[L; 4], wanted: L::Mask) -> L::Mask {
+    let at_once = all_positive(c);
+    if !(wanted & !at_once).any() {
+        return at_once;
     }
-    let [first, second] = split(&left, L::splat(0.5));
-    is_positive | (all_positive(&first) & all_positive(&second))
+    let [first, second] = split(c, L::splat(0.5));
+    at_once | (all_positive(&first) & all_positive(&second))
 }
 
 /// Bernstein coefficients on \[0, x\] and on \[x, 1\] (de Casteljau).

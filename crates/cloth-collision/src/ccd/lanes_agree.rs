@@ -58,7 +58,7 @@ fn in_a_batch(
     let end: Vec<Vec3> = pairs.iter().flat_map(|p| p[4..].to_vec()).collect();
     let vertices: Vec<[u32; 4]> = (0..pairs.len() as u32).map(|k| [0, 1, 2, 3].map(|j| 4 * k + j)).collect();
     let mut batch = Batch::default();
-    let left = batch.decide(instructions, kind, &Motions::new(&start, &end, thickness), &vertices);
+    let left = batch.decide(instructions, kind, &Motions::new(&start, &end, thickness), &vertices[..]);
     let mut answers = vec![None; pairs.len()];
     for (pair, time) in batch.contacts() {
         answers[pair as usize] = Some(time);

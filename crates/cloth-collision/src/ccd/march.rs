@@ -79,14 +79,13 @@ fn to_unit<L: Doubles, M: Motion<L, K>, const K: usize>(motion: &mut M) {
 /// The questions.
 #[derive(Debug, Clone, Copy)]
 enum Question {
-    /// What needs no time: is the pair apart along an axis, is it a contact for its lack of size?
-    Start,
     /// When is the next time at which the points may be coplanar?
     Root,
     /// When is the first time that no direction gets past?
     Direction,
 }
 
+/// What needs no time: is the pair apart along an axis, is it a contact for its lack of size?
 #[inline(always)]
 fn start<L: Doubles, M: Motion<L, K>, const K: usize>(motion: &M, t: L) -> Answer<L> {
     let relative = motion.relative();
@@ -128,27 +127,26 @@ pub(crate) fn march<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
         times[pair as usize] = 0.0;
     }
     let mut count = pairs.len();
+    let mut is_first = true;
     // A loop over the questions, so that each is compiled once.
-    for step in 0..=2 * MAX_ROUNDS {
+    for step in 0..2 * MAX_ROUNDS {
         if count == 0 {
             break;
         }
-        let question = match step {
-            0 => Question::Start,
-            _ if step % 2 == 1 => Question::Root,
-            _ => Question::Direction,
-        };
+        let question = if step % 2 == 0 { Question::Root } else { Question::Direction };
         if matches!(question, Question::Root) && thickness > 0.0 {
             continue;
         }
-        count = ask::<L, M, K>(question, &rows, thickness, &mut pairs[..count], times);
+        count = ask::<L, M, K>(question, is_first, &rows, thickness, &mut pairs[..count], times);
+        is_first = false;
     }
 }
 
-/// Asks all pairs, notes their times, and brings those that go on to the front: how many they are.
+/// Asks all pairs, the first time also what needs no time, notes their times, and brings those that go on to the front: how many they are.
 #[inline(always)]
 fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
     question: Question,
+    is_first: bool,
     rows: &impl Fn(u32) -> Rows<'a>,
     thickness: f64,
     pairs: &mut [u32],
@@ -164,11 +162,15 @@ fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
             t[lane] = times[pairs[first + lane] as usize];
         }
         let (motion, t) = (M::new(&points, thickness), L::from_array(&t));
-        let Answer { goes_on, time } = match question {
-            Question::Start => start(&motion, t),
+        let before = if is_first { Some(start(&motion, t)) } else { None };
+        let Answer { mut goes_on, mut time } = match question {
             Question::Root => root(motion, t),
             Question::Direction => direction(motion, t),
         };
+        if let Some(before) = before {
+            time = L::select(before.goes_on, time, before.time);
+            goes_on = goes_on & before.goes_on;
+        }
         let (goes_on, time) = (goes_on.bits(), time.to_array());
         for lane in 0..count {
             let pair = pairs[first + lane];

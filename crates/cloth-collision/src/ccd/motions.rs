@@ -80,6 +80,25 @@ impl Motions {
         });
     }
 
+    /// [`Motions::new_in`] of the vertices in `order`, which number the motions.
+    pub(crate) fn ordered_in(
+        start: &[Vec3],
+        end: &[Vec3],
+        order: &[u32],
+        thickness: f64,
+        pool: &rayon::ThreadPool,
+    ) -> Self {
+        let small = Smaller::new(start, end);
+        let both =
+            || order.par_iter().with_min_len(VERTEX_CHUNK).map(|&v| (&start[v as usize], &end[v as usize]));
+        pool.install(|| Self {
+            doubles: both().map(|(a, b)| Motion([row(a), row(b)])).collect(),
+            small: both().map(|(a, b)| small.motion(a, b)).collect(),
+            thickness,
+            small_thickness: thickness * small.factor,
+        })
+    }
+
     #[inline(always)]
     pub(crate) fn rows(&self, vertices: &[u32; 4]) -> Rows<'_> {
         let (a, b) = (&self.doubles[vertices[0] as usize].0, &self.doubles[vertices[1] as usize].0);

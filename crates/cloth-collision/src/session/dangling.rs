@@ -76,7 +76,7 @@ impl Upwards {
         let is_dangling = |v: &u32| vertices.binary_search(v).is_ok();
         let (mut triangles, mut marked) = (0, vec![]);
         for &leaf in leaves {
-            boxes.refit_leaf(tree, mesh, leaf as usize);
+            boxes.refit_leaf(tree, leaf as usize);
             let lanes = &mut boxes.lanes[leaf as usize];
             lanes.is_flat = false;
             for (lane, &t) in tree.triangle_ids[leaf as usize].iter().enumerate() {

@@ -37,7 +37,7 @@ impl Visit<2> for Collect<'_> {
         debug_assert!(used[0] >> LANES == 0);
     }
 
-    fn finish(&mut self) {}
+    fn finish(&mut self, _: &LeafPairs<'_, 2>) {}
 }
 
 impl Collect<'_> {

@@ -80,7 +80,7 @@ CASES = (
         "Triangle sizes 1 : 1000",
         "A quarter of a disc in rings that grow by a constant factor: triangles of one shape, the smallest 1000 times "
         "smaller than the largest, fall on a floor.",
-        dt_axis(),
+        dt_axis((1e-3, 2e-3, 5e-3, 1 / 60, 1 / 24)),
         Axis("ratio", (2.0, 10.0, 100.0, 1000.0), (1000.0,), "", "largest over smallest triangle's edge"),
         _sizes,
     ),

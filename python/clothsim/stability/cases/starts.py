@@ -12,13 +12,15 @@ __all__ = ["CASES"]
 
 _N = 6
 _UPRIGHT = {"axis": [1, 0, 0], "angle": 1.5707963267948966}
+_STARTS = ("refuse", "allow", "untangle")
 _KINDS = ("parallel", "shifted", "beside", "edge on face", "corner on face", "on a floor")
 
 
-def _pair(dt: float, second: dict[str, Any], **contact: Any) -> Scene:
+def _pair(dt: float, second: dict[str, Any], start: str = "", **contact: Any) -> Scene:
     """A sheet in y = 0, held at its corners, and a second one."""
+    keys: dict[str, Any] = {"start": start} if start else {}
     return Scene(
-        duration=max(0.1, 4.0 * dt), time={"dt": dt}, contact={"thickness": THICKNESS, **contact},
+        duration=max(0.1, 4.0 * dt), time={"dt": dt}, contact={"thickness": THICKNESS, **contact}, **keys,
         cloth=[
             {"name": "first", "mesh": grid(0.2, _N), "material": "cotton",
              "pins": [{"vertices": [0, _N - 1, _N * (_N - 1), _N * _N - 1]}]},
@@ -55,7 +57,9 @@ def _touching(gap: float, kind: str) -> Setup:
 def _intersecting(depth: float, start: str) -> Setup:
     """An upright sheet reaches so far below the first one."""
     second = {"position": [0.013, 0.1 - depth, 0.007], "rotation": _UPRIGHT}
-    return Setup(_pair(5e-3, second, **({"allow_intersections": True} if start == "allow" else {})))
+    if start == "untangle":
+        return Setup(_pair(5e-3, second, start))
+    return Setup(_pair(5e-3, second, allow_intersections=start == "allow"))
 
 
 def _dt_of_touching(dt: float, kind: str) -> Setup:
@@ -88,9 +92,9 @@ CASES = (
         "intersecting",
         "Starts that intersect",
         "An upright sheet reaches through a level one. The default has to refuse it with the number of pairs; with "
-        "intersections allowed none may be added.",
+        "intersections allowed none may be added; untangled it has to start without, or be refused with the number.",
         Axis("depth", (1e-9, 1e-6, 1e-3, 0.01, 0.05), (1e-6, 0.05), "m", "depth"),
-        Axis("start", ("refuse", "allow"), ("refuse", "allow"), "", "contact.allow_intersections"),
+        Axis("start", _STARTS, _STARTS, "", "what is done about it"),
         _intersecting,
     ),
 )
