@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema validation stability clean
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability clean
 
 help: ## List the targets
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -57,6 +57,16 @@ compare: build ## Detection side by side with IPC Toolkit, in one run (installs 
 schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 	$(BIN)/clothsim schema > docs/scene.schema.json
 
+gallery: build ## Make all studies of the gallery again (five minutes on two idle cores; only there times count)
+	$(BIN)/python tools/gallery.py
+
+# Blender has NumPy 1 and weighs 0.9 GB installed: an environment of its own.
+blender: build ## Import what we write into headless Blender and compare every vertex (downloads 0.4 GB, Python 3.11)
+	[ -x .venv-blender/bin/python ] || $(PYTHON) -m venv .venv-blender
+	.venv-blender/bin/python -m pip install --quiet --disable-pip-version-check "bpy==4.5.15"
+	$(BIN)/python tools/blender/write.py out/blender
+	.venv-blender/bin/python tools/blender/check.py out/blender
+
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
 
@@ -64,4 +74,4 @@ stability: build ## Run the stability atlas, every case over its whole map (minu
 	$(BIN)/clothsim stability -o stability --overwrite
 
 clean: ## Remove what the targets above made
-	rm -rf target $(VENV) out
+	rm -rf target $(VENV) .venv-blender out

@@ -86,8 +86,14 @@ impl Swing {
         let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
         let rest = RestShape::new(&mesh, Vec3::x()).unwrap();
         let material = Material { bending, ..library::named("cotton").unwrap() };
-        let part =
-            ClothPart { mesh: &mesh, topology: &topology, rest: &rest, material: &material, first_vertex: 0 };
+        let part = ClothPart {
+            mesh: &mesh,
+            topology: &topology,
+            rest: &rest,
+            material: &material,
+            first_vertex: 0,
+            triangles: None,
+        };
         let system = ClothSystem::new(&[part], &Environment::default(), mesh.vertices.len()).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(THREADS).build().unwrap();
         let integrator = Integrator::new(system, IntegratorParams::default(), Arc::new(pool)).unwrap();

@@ -31,7 +31,14 @@ fn integrator(mesh: &TriMesh, solver: SolverMethod, method: Method) -> Integrato
     let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
     let rest = RestShape::new(mesh, Vec3::x()).unwrap();
     let material = library::named("cotton").unwrap();
-    let part = ClothPart { mesh, topology: &topology, rest: &rest, material: &material, first_vertex: 0 };
+    let part = ClothPart {
+        mesh,
+        topology: &topology,
+        rest: &rest,
+        material: &material,
+        first_vertex: 0,
+        triangles: None,
+    };
     let system = ClothSystem::new(&[part], &Environment::default(), mesh.vertices.len()).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(THREADS).build().unwrap();
     let mut params = IntegratorParams { method, ..IntegratorParams::default() };

@@ -15,6 +15,7 @@ Examples
 
 from clothsim import bending, collision, errors, friction, stability, study
 from clothsim._core import __version__
+from clothsim.animation import Animation
 from clothsim.errors import (
     CheckpointError,
     ClothSimError,
@@ -34,7 +35,7 @@ from clothsim.errors import (
 from clothsim.material import Fabric, Material, materials
 from clothsim.mesh import Mesh
 from clothsim.recording import Body, Recording
-from clothsim.scene import Animation, Scene
+from clothsim.scene import Scene
 from clothsim.simulation import Frame, Plan, Simulation, record
 
 __all__ = [

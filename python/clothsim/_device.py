@@ -7,12 +7,13 @@ import operator
 
 from clothsim.errors import InvalidInput
 
-__all__ = ["DEVICES", "check_device", "check_threads"]
+__all__ = ["DEVICES", "GPU_METHODS", "check_device", "check_threads"]
 
 _MOST_THREADS = 65_536
 
 
 DEVICES = ("auto", "cpu", "gpu")
+GPU_METHODS = ("grid", "virtual-subdivision", "octree-single", "octree")
 
 
 def check_device(device: str) -> str:

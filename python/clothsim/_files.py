@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from clothsim.errors import OutputError
+from clothsim.errors import OutputError, OutputExists
 
-__all__ = ["output_error", "replacing", "whole", "write_whole"]
+__all__ = ["output_error", "replacing", "whole", "whole_folder", "write_whole"]
 
 
 @contextlib.contextmanager
@@ -44,6 +45,33 @@ def replacing(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+@contextlib.contextmanager
+def whole_folder(folder: Path, *, overwrite: bool) -> Iterator[Path]:
+    """Give a temporary neighbour of ``folder``; on success it becomes ``folder``, else it is removed.
+
+    Raises
+    ------
+    OutputExists
+        There is something of that name, and ``overwrite`` is not set.
+    OutputError
+        The folder cannot be written, or the disk is full.
+    """
+    if folder.exists() and not overwrite:
+        raise OutputExists(f"{folder}: there is something of that name already")
+    part = folder.with_name(f".{folder.name}.part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        yield part
+        if folder.exists():
+            shutil.rmtree(folder)
+        part.rename(folder)
+    except OSError as error:
+        raise output_error(folder, error) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -97,7 +97,7 @@ class MeshError(ClothSimError, ValueError):
     kind : str
         ``"not-finite"``, ``"index-out-of-range"``, ``"zero-area"``, ``"non-manifold-edge"``, ``"unreferenced"``,
         ``"duplicate-triangle"``, ``"degenerate"``, ``"uv-length"``, ``"uv-not-finite"``, ``"zero-area-uv"``,
-        ``"parameter"``, ``"empty"`` or ``"file"``.
+        ``"parameter"``, ``"topology"`` (frames of an animation that differ), ``"empty"`` or ``"file"``.
     vertices : tuple of int
         The vertices concerned: the bad one, the triangle's three, the edge's two.
     triangles : tuple of int

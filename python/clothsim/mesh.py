@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,8 @@ class Mesh:
     uv : (n, 2) or (m, 3, 2) array of float64, optional
         Material coordinates, u along the warp and v along the weft [m]: per vertex, or per triangle corner where a
         vertex lies on a seam and belongs to two panels.
+    groups : mapping of str to (k,) array of int, optional
+        Named groups of triangles, for regions of another material.
 
     Raises
     ------
@@ -50,17 +53,26 @@ class Mesh:
     0.5
     """
 
-    __slots__ = ("_triangles", "_uv", "_vertices")
+    __slots__ = ("_groups", "_triangles", "_uv", "_vertices")
 
-    def __init__(self, vertices: ArrayLike, triangles: ArrayLike, uv: ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        triangles: ArrayLike,
+        uv: ArrayLike | None = None,
+        groups: Mapping[str, ArrayLike] | None = None,
+    ) -> None:
         points = floats(vertices, "vertices", "shape (n, 3)").copy()
         corners = indices(triangles, "triangles").copy()
         corner_uv = None if uv is None else _per_corner(floats(uv, "uv"), len(points), corners)
         _core.check_mesh(points, corners, corner_uv)
-        self._adopt(points, corners, corner_uv)
+        self._adopt(points, corners, corner_uv, _groups(groups or {}, len(corners)))
 
-    def _adopt(self, vertices: Floats, triangles: Ints, uv: Floats | None) -> None:
-        for array in (vertices, triangles, uv):
+    def _adopt(
+        self, vertices: Floats, triangles: Ints, uv: Floats | None, groups: Mapping[str, Ints] | None = None
+    ) -> None:
+        self._groups = dict(groups or {})
+        for array in (vertices, triangles, uv, *self._groups.values()):
             if array is not None:
                 array.flags.writeable = False
         self._vertices = vertices
@@ -89,6 +101,11 @@ class Mesh:
         return self._uv
 
     @property
+    def groups(self) -> dict[str, Ints]:
+        """Triangles of each named group, ascending, int64, read-only; OBJ's ``g``, ``o`` and ``usemtl``."""
+        return dict(self._groups)
+
+    @property
     def area(self) -> float:
         """Total area of the triangles [m²]."""
         a, b, c = (self._vertices[self._triangles[:, k]] for k in range(3))
@@ -113,7 +130,7 @@ class Mesh:
         m = floats(matrix, "matrix", "shape (4, 4)")
         if m.shape != (4, 4):
             raise InvalidInput(f"matrix: expected shape (4, 4), got shape {m.shape}", name="matrix")
-        return Mesh(self._vertices @ m[:3, :3].T + m[:3, 3], self._triangles, self._uv)
+        return Mesh(self._vertices @ m[:3, :3].T + m[:3, 3], self._triangles, self._uv, self._groups)
 
     # Generators ------------------------------------------------------------------------------------------------
 
@@ -170,11 +187,12 @@ class Mesh:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Mesh:
-        """Read an OBJ, PLY, STL, glTF or GLB file; coordinates are taken as metres.
+        """Read an OBJ, PLY, STL, glTF, GLB or USD file; coordinates are taken as metres (USD: as the stage says).
 
         Vertices keep the file's order (STL and glTF, which repeat vertices: the order in which triangles first name
         them, equal positions joined). Polygons are triangulated. UV is kept per corner, so seams do not cut the
-        cloth. STL and glTF need trimesh: ``pip install 'clothsim[mesh]'``.
+        cloth. Groups of OBJ faces are kept. STL and glTF need trimesh, ``pip install 'clothsim[mesh]'``; USD needs
+        usd-core, ``pip install 'clothsim[usd]'``.
 
         Raises
         ------
@@ -190,9 +208,9 @@ class Mesh:
             raise
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an OBJ file (UV per corner) or a binary PLY file (UV if each vertex has one), whole or not at all."""
+        """Write OBJ (UV per corner, groups) or binary PLY (UV if each vertex has one), whole or not at all."""
         where = Path(path)
-        write_whole(where, _formats.write(where, RawMesh(self._vertices, self._triangles, self._uv)))
+        write_whole(where, _formats.write(where, RawMesh(self._vertices, self._triangles, self._uv, self._groups)))
 
     def __repr__(self) -> str:
         n, m = len(self._vertices), len(self._triangles)
@@ -209,12 +227,14 @@ class Mesh:
             same_uv
             and np.array_equal(self._vertices, other._vertices)
             and np.array_equal(self._triangles, other._triangles)
+            and self._groups.keys() == other._groups.keys()
+            and all(np.array_equal(self._groups[name], other._groups[name]) for name in self._groups)
         )
 
     __hash__ = None  # type: ignore[assignment]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return (Mesh, (self._vertices, self._triangles, self._uv))
+        return (Mesh, (self._vertices, self._triangles, self._uv, self._groups))
 
 
 def _per_corner(uv: Floats, vertex_count: int, triangles: Ints) -> Floats:
@@ -228,6 +248,19 @@ def _per_corner(uv: Floats, vertex_count: int, triangles: Ints) -> Floats:
     raise InvalidInput(
         f"uv: expected {expected}, got shape {uv.shape}", name="uv", expected=expected, got=f"shape {uv.shape}"
     )
+
+
+def _groups(groups: Mapping[str, ArrayLike], triangle_count: int) -> dict[str, Ints]:
+    """Each group's triangles, ascending and once each."""
+    out = {}
+    for name, members in groups.items():
+        key = f"groups[{name!r}]"
+        listed = np.unique(indices(members, key, "shape (k,)"))
+        if listed.size and (listed[0] < 0 or listed[-1] >= triangle_count):
+            expected, got = f"triangles in 0..{triangle_count}", str(listed[0] if listed[0] < 0 else listed[-1])
+            raise InvalidInput(f"{key}: expected {expected}, got {got}", name=key, expected=expected, got=got)
+        out[name] = listed
+    return out
 
 
 def _whole(name: str, value: int) -> int:

@@ -6,19 +6,20 @@ import io
 import json
 import os
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clothsim._arrays import Floats, Ints
-from clothsim._files import output_error, whole
+from clothsim._files import whole
 from clothsim.errors import InvalidInput
 
-__all__ = ["Body", "FrameWriter", "Recording"]
+__all__ = ["Body", "Recording", "body_facts"]
 
 _FORMAT = 1
 
@@ -64,6 +65,8 @@ class Recording:
         Positions [m] of the bodies that are not static, one after the other in the order of ``bodies``.
     standing : (k, 3) float64
         Positions [m] of the static bodies, likewise.
+    velocities : (frames, c, 3) float64, optional
+        Velocities [m/s] of all cloth vertices, cloth after cloth.
     fps : float
         Frames per second.
     up : {"y", "z"}
@@ -87,6 +90,7 @@ class Recording:
         moving: Floats,
         standing: Floats | None = None,
         *,
+        velocities: Floats | None = None,
         fps: float = 60.0,
         up: str = "y",
         name: str = "",
@@ -98,10 +102,16 @@ class Recording:
         self.name = name
         self._moving = moving
         self._standing = np.zeros((0, 3)) if standing is None else standing
+        self._velocities = velocities
         self._slices = _slices(self.bodies)
         expected = (len(self.times), sum(b.vertex_count for b in self.bodies if not b.static), 3)
         if moving.shape != expected:
             raise InvalidInput(f"moving: expected shape {expected}, got shape {moving.shape}", name="moving")
+        expected = (len(self.times), sum(b.vertex_count for b in self.cloth), 3)
+        if velocities is not None and velocities.shape != expected:
+            raise InvalidInput(
+                f"velocities: expected shape {expected}, got shape {velocities.shape}", name="velocities"
+            )
 
     def __len__(self) -> int:
         return len(self.times)
@@ -124,6 +134,18 @@ class Recording:
         where = self._slices[found.name]
         return np.array(self._standing[where] if found.static else self._moving[frame][where])
 
+    def velocities(self, body: Body | str, frame: int) -> Floats | None:
+        """Velocities [m/s] of a cloth in a frame, shape (n, 3), a copy; None for a collider, or where none are kept."""
+        found = self.body(body) if isinstance(body, str) else body
+        if self._velocities is None or found.kind != "cloth":
+            return None
+        return np.array(self._velocities[frame][self._slices[found.name]])
+
+    @property
+    def has_velocities(self) -> bool:
+        """Whether velocities were kept."""
+        return self._velocities is not None
+
     @property
     def cloth(self) -> tuple[Body, ...]:
         """The bodies that move by forces."""
@@ -135,8 +157,9 @@ class Recording:
         """Write everything to one ``.npz``, whole or not at all; equal recordings give equal bytes.
 
         ``positions`` (frames, n, 3), ``triangles`` (m, 3) and ``uv`` (m, 3, 2; NaN where a cloth has none) hold all
-        cloths joined; ``times`` (frames,); ``collider_0_positions`` (frames or 1 if static, n, 3) and
-        ``collider_0_triangles`` each collider; ``meta`` a JSON text with names, ranges, fps and the up axis.
+        cloths joined, ``velocities`` (frames, n, 3) where they were kept; ``times`` (frames,);
+        ``collider_0_positions`` (frames or 1 if static, n, 3) and ``collider_0_triangles`` each collider; ``meta`` a
+        JSON text with names, ranges, fps and the up axis.
         """
         with whole(Path(path)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
             for name, shape, rows in self._members():
@@ -148,6 +171,8 @@ class Recording:
         firsts = np.cumsum([0, *(b.vertex_count for b in cloth)]).tolist()
         yield "times", self.times, ()
         yield "positions", (len(self), count, 3), (self._moving[f][:count] for f in range(len(self)))
+        if self._velocities is not None:
+            yield "velocities", (len(self), count, 3), (self._velocities[f] for f in range(len(self)))
         triangles = [b.triangles + first for b, first in zip(cloth, firsts, strict=False)]
         yield "triangles", np.concatenate([np.zeros((0, 3), np.int64), *triangles]), ()
         if any(b.uv is not None for b in cloth):
@@ -174,9 +199,38 @@ class Recording:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Recording:
-        """Read what `save` wrote."""
-        with np.load(path, allow_pickle=False) as data:
+        """Read what `save` wrote.
+
+        Raises
+        ------
+        InvalidInput
+            The file cannot be read, is cut off or damaged, or holds something else; it is named.
+        """
+        try:
+            return cls._load(path)
+        except (
+            OSError,
+            EOFError,
+            ValueError,
+            KeyError,
+            TypeError,
+            IndexError,
+            zipfile.BadZipFile,
+            zlib.error,
+        ) as error:
+            reason = getattr(error, "strerror", None) or (
+                f"{error.args[0]} is missing" if isinstance(error, KeyError) and error.args else str(error)
+            )
+            raise InvalidInput(f"{path}: not a recording that can be read: {reason}", name="path") from error
+
+    @classmethod
+    def _load(cls, path: str | os.PathLike[str]) -> Recording:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+            if not isinstance(data, np.lib.npyio.NpzFile):
+                raise ValueError("expected an archive of arrays (.npz), got one array")
             meta = json.loads(str(data["meta"]))
+            if meta["format"] != _FORMAT:
+                raise ValueError(f"expected format {_FORMAT}, got {meta['format']!r}")
             bodies: list[Body] = []
             moving, standing = [data["positions"]], [np.zeros((0, 3))]
             first_vertex = first_triangle = collider = 0
@@ -199,6 +253,7 @@ class Recording:
                     moving.append(positions)
             return cls(
                 bodies, data["times"], np.concatenate(moving, axis=1), np.concatenate(standing),
+                velocities=data.get("velocities"),
                 fps=meta["fps"], up=meta["up"], name=meta["name"],
             )  # fmt: skip
 
@@ -207,6 +262,24 @@ class Recording:
         from clothsim._export import usd
 
         usd.write(self, Path(path))
+
+    def save_gltf(self, path: str | os.PathLike[str]) -> None:
+        """Write a binary glTF file (``.glb``) whose morph targets are the frames."""
+        from clothsim._export import gltf
+
+        gltf.write(self, Path(path))
+
+    def save_pc2(self, folder: str | os.PathLike[str]) -> None:
+        """Write a mesh and a point cache (PC2) per body into a new folder."""
+        from clothsim._export import pc2
+
+        pc2.write(self, Path(folder))
+
+    def save_vtk(self, folder: str | os.PathLike[str]) -> None:
+        """Write VTK files and a ParaView collection, ``scene.pvd``, into a new folder. Needs PyVista."""
+        from clothsim._export import vtk
+
+        vtk.write(self, Path(folder))
 
     def save_sequence(self, folder: str | os.PathLike[str], suffix: str = "obj") -> None:
         """Write one mesh file per frame and body into a new folder: ``<body>_0000.obj`` or ``.ply``."""
@@ -246,80 +319,6 @@ def _write_member(
         np.lib.format.write_array_header_1_0(member, header)
         for row in rows:
             member.write(np.ascontiguousarray(row, dtype="<f8").tobytes())
-
-
-class FrameWriter:
-    """An append-only file of frames: rows of float64, one per frame, and one JSON line per frame beside it.
-
-    Rows that a crash left behind a checkpoint are cut off by ``keep``.
-    """
-
-    def __init__(self, folder: Path, vertex_count: int, *, keep: int = 0) -> None:
-        self._rows_path = folder / "frames.bin"
-        self._lines_path = folder / "frames.jsonl"
-        self._stride = vertex_count * 24
-        self._count = vertex_count
-        self.frames = keep
-        self._rows = self._rows_path.open("r+b" if self._rows_path.exists() else "w+b")
-        self._lines = self._lines_path.open("r+b" if self._lines_path.exists() else "w+b")
-        self._cut(keep)
-
-    def _cut(self, keep: int) -> None:
-        lines = self._lines.read().split(b"\n")[:keep]
-        size = os.fstat(self._rows.fileno()).st_size
-        if len(lines) < keep or size < keep * self._stride:
-            raise InvalidInput(
-                f"{self._rows_path.parent}: expected {keep} frames as the checkpoint says, got fewer", name="OUT"
-            )
-        self._rows.truncate(keep * self._stride)
-        self._rows.seek(keep * self._stride)
-        text = b"".join(line + b"\n" for line in lines)
-        self._lines.truncate(len(text))
-        self._lines.seek(len(text))
-
-    def append(self, positions: Floats, facts: dict[str, Any]) -> None:
-        """Add a frame: positions (n, 3) of the moving bodies [m] and what is to be known about it."""
-        try:
-            self._rows.write(np.ascontiguousarray(positions, dtype="<f8").tobytes())
-            self._lines.write(json.dumps(facts).encode() + b"\n")
-            self._rows.flush()
-            self._lines.flush()
-        except OSError as error:
-            raise output_error(self._rows_path, error) from error
-        self.frames += 1
-
-    def sync(self) -> None:
-        """Make sure that the frames are on the disk."""
-        for file in (self._rows, self._lines):
-            try:
-                file.flush()
-                os.fsync(file.fileno())
-            except OSError as error:
-                raise output_error(self._rows_path, error) from error
-
-    def close(self) -> None:
-        """Close the files, keeping what could be written."""
-        for file in (self._rows, self._lines):
-            _close(file)
-
-    def facts(self) -> list[dict[str, Any]]:
-        """What `append` was told about each frame."""
-        with self._lines_path.open("rb") as file:
-            return [json.loads(line) for line in file.read().splitlines()[: self.frames]]
-
-    def rows(self) -> Floats:
-        """All frames (frames, n, 3), mapped from the file, read-only."""
-        if self.frames == 0 or self._count == 0:
-            return np.zeros((self.frames, self._count, 3))
-        return np.memmap(self._rows_path, dtype="<f8", mode="r", shape=(self.frames, self._count, 3))
-
-
-def _close(file: IO[bytes]) -> None:
-    try:
-        file.close()
-    except OSError:
-        # The disk is full and the buffer cannot be written: the frames since the last checkpoint are lost anyway.
-        return
 
 
 def body_facts(body: Body) -> dict[str, Any]:

@@ -14,41 +14,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clothsim import _core, _formats
-from clothsim._arrays import Floats, Ints, floats, indices
+from clothsim._arrays import Floats, Ints, floats
 from clothsim._export.names import file_stem
 from clothsim._files import write_whole
 from clothsim._formats import RawMesh
 from clothsim._plain import plain
-from clothsim.errors import InvalidInput, InvalidScene, MeshError
+from clothsim.animation import Animation
+from clothsim.errors import InvalidScene
 from clothsim.friction import Pair
 from clothsim.material import Material
 from clothsim.mesh import Mesh
 
 __all__ = ["Animation", "Scene"]
-
-
-class Animation:
-    """An animated mesh of fixed topology: vertices per frame, linear in between.
-
-    Parameters
-    ----------
-    positions : (frames, n, 3) array of float64
-        Vertex positions [m].
-    triangles : (m, 3) array of int32 or int64
-        Vertex indices.
-    fps : float
-        Frames per second.
-    """
-
-    def __init__(self, positions: ArrayLike, triangles: ArrayLike, fps: float) -> None:
-        self.positions: Floats = floats(positions, "positions", "shape (frames, n, 3)")
-        self.triangles: Ints = indices(triangles, "triangles")
-        self.fps = float(fps)
-        if self.positions.ndim != 3 or self.positions.shape[2] != 3:
-            expected, got = "shape (frames, n, 3)", f"shape {self.positions.shape}"
-            raise InvalidInput(
-                f"positions: expected {expected}, got {got}", name="positions", expected=expected, got=got
-            )
 
 
 class Scene:
@@ -104,7 +81,7 @@ class Scene:
         output: Mapping[str, Any] | None = None,
     ) -> None:
         self._meshes: dict[str, Mesh] = {}
-        self._sequences: dict[str, tuple[Floats, Ints]] = {}
+        self._sequences: dict[str, tuple[Floats, Ints, float | None]] = {}
         self._velocities: dict[str, Floats] = {}
         self._core: _core.Scene | None = None
         self.folder: Path | None = None
@@ -144,8 +121,8 @@ class Scene:
             Unique among all bodies.
         **keys
             Further keys of a ``[[cloth]]`` table: ``position`` [m], ``rotation``, ``velocity`` [m/s],
-            ``velocities`` (n, 3) [m/s], ``rest``, ``warp``, ``self_collision``, ``pins``, ``friction``,
-            ``self_friction``, ``strain_limit``.
+            ``velocities`` (n, 3) [m/s], ``rest``, ``warp``, ``self_collision``, ``pins``, ``regions``, ``seams``,
+            ``friction``, ``self_friction``, ``strain_limit``.
         """
         table = {"name": name, "mesh": mesh, "material": material, **keys}
         self._append("cloth", self._cloth_table(table, f"cloth[{len(self._data['cloth'])}]"))
@@ -235,7 +212,7 @@ class Scene:
             out["mesh"] = {"asset": self._keep(self._meshes, out["mesh"], str(out.get("name", "collider")))}
         sequence = out.get("sequence")
         if isinstance(sequence, Animation):
-            frames = (sequence.positions, sequence.triangles)
+            frames = (sequence.positions, sequence.triangles, sequence.fps)
             asset = self._keep(self._sequences, frames, str(out.get("name", "collider")))
             out["sequence"] = {"asset": asset, "fps": sequence.fps}
         return _table(out, key)
@@ -291,8 +268,7 @@ class Scene:
     def load(cls, path: str | os.PathLike[str]) -> Scene:
         """Read a scene file (TOML) and the mesh files that it names, relative to it.
 
-        Animated meshes are ``.npz`` files with ``positions`` (frames, n, 3) and ``triangles`` (m, 3); start velocities
-        are ``.npy`` files (n, 3).
+        Animated meshes are read as by `Animation.load`; start velocities are ``.npy`` files (n, 3).
 
         Raises
         ------
@@ -315,10 +291,10 @@ class Scene:
     def _load_files(self) -> None:
         core = self.check()
         folder = self.folder or Path()
-        for path, is_sequence, key in core.files():
+        for path, is_sequence, key, asset in core.files():
             try:
                 if is_sequence:
-                    self._sequences[path] = _read_sequence(folder / path)
+                    self._sequences[asset] = self._read_sequence(folder / path, key)
                 else:
                     self._meshes[path] = Mesh.load(folder / path)
             except (ValueError, OSError) as error:
@@ -333,6 +309,17 @@ class Scene:
                 except (ValueError, OSError) as error:
                     core.fail(f"cloth[{i}].velocities", "a file that can be used", str(error))
 
+    def _read_sequence(self, path: Path, key: str) -> tuple[Floats, Ints, float | None]:
+        """Frames of the collider whose ``sequence.file`` is at ``key``, and their rate if the file says one."""
+        from clothsim._formats import animation as formats
+
+        source = self._data["collider"][int(key[len("collider[") : key.index("]")])]["sequence"]
+        request = formats.Request(
+            source.get("fps"), source.get("scale") or 1.0, source.get("up"), self._data["up"], source.get("animation"),
+            source.get("part"),
+        )  # fmt: skip
+        return formats.read(path, request)
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a scene file (TOML, defaults written out), and beside it the meshes that the scene holds as arrays.
 
@@ -343,6 +330,7 @@ class Scene:
         where = Path(path)
         data = self.to_dict()
         stems = iter(_file_stems(where.stem, [body["name"] for body in (*data["cloth"], *data["collider"])]))
+        names = (asset for _, is_sequence, _, asset in self.check().files() if is_sequence)
         here = self.folder is not None and self.folder.resolve() == where.parent.resolve()
         for body in (*data["cloth"], *data["collider"]):
             mesh = body.get("mesh") or {}
@@ -351,13 +339,12 @@ class Scene:
             if name is not None and not (here and "file" in mesh):
                 body["mesh"] = {"file": _save_mesh(self._meshes[name], where, stem)}
             sequence = body.get("sequence") or {}
-            name = sequence.get("asset") or sequence.get("file")
+            name = next(names) if sequence.get("file") else sequence.get("asset")
             if name is not None and not (here and sequence.get("file")):
                 file = f"{stem}.npz"
-                positions, triangles = self._sequences[name]
+                positions, triangles, fps = self._sequences[name]
                 write_whole(where.with_name(file), _npz(positions=positions, triangles=triangles))
-                kept = {k: v for k, v in sequence.items() if k not in ("asset", "file")}
-                body["sequence"] = {"file": file, **kept}
+                body["sequence"] = {"file": file, "fps": sequence.get("fps") or fps, "start": sequence["start"]}
             name = body.get("velocities")
             if name is not None and not (here and name.endswith(".npy")):
                 file = f"{stem}_velocities.npy"
@@ -367,9 +354,16 @@ class Scene:
 
     def assets(
         self,
-    ) -> tuple[dict[str, tuple[Floats, Ints, Floats | None]], dict[str, tuple[Floats, Ints]], dict[str, Floats]]:
-        """Return the arrays that the scene holds by name: meshes, animated meshes, start velocities."""
-        meshes = {name: (mesh.vertices, mesh.triangles, mesh.uv) for name, mesh in self._meshes.items()}
+    ) -> tuple[
+        dict[str, tuple[Floats, Ints, Floats | None, dict[str, list[int]]]],
+        dict[str, tuple[Floats, Ints, float | None]],
+        dict[str, Floats],
+    ]:
+        """Return what the scene holds by name: meshes with groups, animated meshes with rates, start velocities."""
+        meshes = {
+            name: (mesh.vertices, mesh.triangles, mesh.uv, {g: t.tolist() for g, t in mesh.groups.items()})
+            for name, mesh in self._meshes.items()
+        }
         return meshes, dict(self._sequences), dict(self._velocities)
 
     def __repr__(self) -> str:
@@ -396,23 +390,14 @@ def _file_stems(scene: str, names: list[str]) -> list[str]:
 
 
 def _save_mesh(mesh: Mesh, scene: Path, stem: str) -> str:
-    raw = RawMesh(mesh.vertices, mesh.triangles, mesh.uv)
-    for suffix in (".ply", ".obj"):
+    raw = RawMesh(mesh.vertices, mesh.triangles, mesh.uv, mesh.groups)
+    for suffix in (".obj",) if mesh.groups else (".ply", ".obj"):
         path = scene.with_name(stem + suffix)
         content = _formats.write(path, raw)
         if suffix == ".obj" or mesh.uv is None or _formats.parse(content, path).uv is not None:
             write_whole(path, content)
             return path.name
     raise AssertionError("an OBJ file holds every mesh")
-
-
-def _read_sequence(path: Path) -> tuple[Floats, Ints]:
-    with np.load(path, allow_pickle=False) as data:
-        for name in ("positions", "triangles"):
-            if name not in data:
-                raise MeshError(f"{path}: expected arrays positions and triangles, got {sorted(data)}", kind="file")
-        animation = Animation(data["positions"], data["triangles"], 1.0)
-    return animation.positions, animation.triangles
 
 
 def _npz(**arrays: Any) -> bytes:

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from clothsim._files import write_whole
 from clothsim.errors import CheckpointError, InvalidInput
 from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
+
+if TYPE_CHECKING:
+    from clothsim._run.start import Start
 
 __all__ = ["Frame", "Hinges", "Plan", "Simulation", "record"]
 
@@ -151,13 +154,88 @@ class Simulation:
         *,
         allow_intersections: bool = False,
     ) -> None:
+        self._begin(scene, threads, device, allow_intersections, None)
+
+    def _begin(
+        self,
+        scene: Scene,
+        threads: int | None,
+        device: str,
+        allow_intersections: bool,
+        start: tuple[float, Floats, Floats] | None,
+    ) -> None:
         if not isinstance(scene, Scene):
             raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
         self._core = _core.Simulation(
-            scene.check(), *scene.assets(), check_threads(threads), check_device(device), bool(allow_intersections)
+            scene.check(),
+            *scene.assets(),
+            check_threads(threads),
+            check_device(device),
+            bool(allow_intersections),
+            start,
         )
         self._logged = 0
         self._log_fallbacks()
+
+    @classmethod
+    def from_frame(
+        cls,
+        scene: Scene,
+        recording: Recording,
+        frame: int = -1,
+        threads: int | None = None,
+        device: str = "auto",
+        *,
+        allow_intersections: bool = False,
+    ) -> Simulation:
+        """Begin in mid-scene, with the cloth as a frame of a recording shows it.
+
+        The scene may be another one than that of the recording, as long as it has cloths of the same names and meshes:
+        colliders, pins, materials and times are the scene's. A frame has no memory of what bending and contact did
+        before it, so a run that goes on from a checkpoint (`resume`) has the same bits, and one from a frame only if
+        neither matters.
+
+        Parameters
+        ----------
+        scene : Scene
+            What to simulate.
+        recording : Recording
+            Frames with the scene's cloths, by name. With velocities (``output.velocities = true``) the state is exact;
+            without, they are the differences of the frames beside it.
+        frame : int
+            Number of the frame; negative: from the end.
+        threads, device, allow_intersections
+            As for `Simulation`.
+
+        Raises
+        ------
+        InvalidInput
+            There is no such frame, or its cloths are not the scene's.
+        IntersectingStart
+            Triangles pass through each other there: an edited collider may be inside the cloth.
+
+        Examples
+        --------
+        >>> import clothsim as cs
+        >>> scene = cs.Scene(duration=0.2)
+        >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton", pins=[{"vertices": [0, 5]}])
+        >>> frames = cs.record(cs.Simulation(scene), 0.1, fps=20, progress=False)
+        >>> round(cs.Simulation.from_frame(scene, frames, 1).time, 3)
+        0.05
+        """
+        from clothsim._run.start import Start
+
+        start = Start.of(recording, scene, frame)
+        return cls._from_start(scene, start, threads, device, allow_intersections=allow_intersections)
+
+    @classmethod
+    def _from_start(
+        cls, scene: Scene, start: Start, threads: int | None, device: str, *, allow_intersections: bool
+    ) -> Simulation:
+        simulation = cls.__new__(cls)
+        state = (start.time, np.ascontiguousarray(start.positions), np.ascontiguousarray(start.velocities))
+        simulation._begin(scene, threads, device, allow_intersections, state)
+        return simulation
 
     @classmethod
     def _over(cls, core: _core.Simulation) -> Simulation:
@@ -451,12 +529,16 @@ def record(
     """
     bodies = simulation.bodies
     scene = json.loads(simulation._core.scene())
-    rows, times = [], []
+    rows, times, velocities = [], [], []
     standing = standing_positions(bodies, simulation.collider_positions)
     for frame in simulation.run(seconds, fps, progress):
         rows.append(moving_positions(bodies, frame.positions, frame.collider_positions))
         times.append(frame.time)
-    return Recording(bodies, np.array(times), np.array(rows), standing, fps=fps, up=scene["up"], name=scene["name"])
+        velocities.append(frame.velocities)
+    return Recording(
+        bodies, np.array(times), np.array(rows), standing,
+        velocities=np.array(velocities), fps=fps, up=scene["up"], name=scene["name"],
+    )  # fmt: skip
 
 
 def moving_positions(bodies: list[Body], cloth: Floats, colliders: Floats) -> Floats:

@@ -138,3 +138,29 @@ def test_the_table_of_methods_has_every_method() -> None:
     assert listed == known
     schema = (ROOT / "docs" / "scene.schema.json").read_text()
     assert all(f'\\"{name}\\"' in schema for name in known)
+
+
+def test_the_page_on_formats_runs_from_top_to_bottom(tmp_path: Path) -> None:
+    """Python, the scene and the commands, in the page's order and one folder."""
+    parts = (ROOT / "docs" / "formats.md").read_text().split("```")
+    blocks = [tuple(part.split("\n", 1)) for part in parts[1::2]]
+    assert [kind for kind, _ in blocks] == ["python", "toml", "python", "sh", "sh", "python"]
+    script: list[str] = ["import subprocess, sys"]
+    for kind, text in blocks:
+        if kind == "python":
+            script.append(text)
+        elif kind == "toml":
+            quick = text.replace("velocities = true", "velocities = true\nfilm_strip = false\nplots = false")
+            (tmp_path / "poncho.toml").write_text(quick)
+        else:
+            script += [
+                f"subprocess.run([sys.executable, '-m', *{line.split()!r}], check=True)" for line in text.splitlines()
+            ]
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(script)], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "stitches" in done.stdout
+    out = sorted(p.name for p in (tmp_path / "out").iterdir())
+    assert out == ["frames.npz", "obj", "pc2", "report.json", "scene.glb", "scene.usdc", "vtk"]
+    assert (tmp_path / "later" / "report.json").exists()

@@ -175,6 +175,7 @@ def test_files_appear_whole_or_not_at_all(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("module", "call"), [
     ("pxr.Gf", lambda r, p: r.save_usd(p / "a.usdc")),
     ("pyvista", lambda r, p: r.film_strip(p / "a.png")),
+    ("pyvista", lambda r, p: r.save_vtk(p / "vtk")),
 ])  # fmt: skip
 def test_a_missing_package_is_named_with_the_way_to_get_it(
     tmp_path: Path, frames: cs.Recording, monkeypatch: pytest.MonkeyPatch, module: str, call: Any

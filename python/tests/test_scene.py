@@ -222,7 +222,7 @@ def test_saved_bodies_whose_names_make_the_same_file_name_keep_their_own_meshes(
         scene.add_cloth(mesh, name=name)
     scene.save(tmp_path / "scene.toml")
     again, _, _ = cs.Scene.load(tmp_path / "scene.toml").assets()
-    assert sorted(len(vertices) for vertices, _, _ in again.values()) == [4, 9, 16]
+    assert sorted(len(vertices) for vertices, *_ in again.values()) == [4, 9, 16]
 
 
 @pytest.mark.parametrize("bodies", ["abc", {"name": "a"}, [1]])

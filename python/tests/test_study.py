@@ -14,6 +14,7 @@ from conftest import ROOT
 from study_scenes import FALLING, HANGING, RESTING, error, load, study
 
 import clothsim as cs
+from clothsim.errors import InvalidInput
 from clothsim.study import evaluate, pareto, quantities
 from clothsim.study.axes import axis, parse
 from clothsim.study.elastica import cantilever
@@ -44,6 +45,7 @@ def test_values_are_read_as_toml_words_and_rows() -> None:
         ("dt=", "expected NAME=VALUE"),
         ("dt=0.1,0.1", "expected each value once"),
         ("dt=1:2:x", "first:last:count"),
+        ("dt=nan,1e-3", "axis dt: expected finite numbers, got nan"),
     ],
 )
 def test_what_is_no_axis_is_refused(text: str, message: str) -> None:
@@ -251,3 +253,34 @@ def test_a_run_that_takes_too_long_is_stopped(tmp_path: Path) -> None:
     scene = load(tmp_path, HANGING.replace("duration = 0.05", "duration = 1e4"))
     found = study(scene, {"dt": [1e-3, 5e-4]}, "energy_drift", limit=1.5)
     assert [row.error for row in found.rows] == ["stopped after 1.5 s"] * 2
+
+
+def test_a_state_in_single_precision_has_a_floor(tmp_path: Path) -> None:
+    """Rounding the state is seen where steps are small; the reference is in f64 whatever comes first."""
+    scene = load(tmp_path, HANGING)
+    made = study(scene, {"precision": ["f32", "f64"], "dt": [1e-3, 2.5e-4]}, "rms", fixed={"integrator": "rk4"})
+    assert made.references[0][1].settings["precision"] == "f64"
+    by = {(row.settings["precision"], row.settings["dt"]): error(row, "rms") for row in made.rows}
+    # Positions of up to 1 m have a spacing of 6e-8 m in f32; rk4 is far below it at either step.
+    assert by["f64", 2.5e-4] < 1e-9
+    assert 1e-8 < by["f32", 2.5e-4] < 1e-5
+    assert by["f32", 2.5e-4] > 0.5 * by["f32", 1e-3], "a smaller step rounds more often"
+
+
+def test_detectors_of_a_gpu_run_on_one_and_end_in_the_same_bits(gpu: str, tmp_path: Path) -> None:
+    made = study(load(tmp_path, RESTING), {"detector": ["bvh", "grid", "octree"]}, "rms", fixed={"duration": 0.05})
+    assert [row.error for row in made.rows] == [None] * 3
+    assert not any("same bits" in note for row in made.rows for note in row.notes), "observed and timed runs agree"
+    assert len({error(row, "rms") for row in made.rows}) == 1
+
+
+@pytest.mark.parametrize(
+    ("vary", "message"),
+    [
+        ({"precision": ["f64", "f16"]}, r'axis precision = f16: precision: expected one of f64, f32, got "f16"'),
+        ({"device": ["cpu", "gpus"]}, r'device: expected one of auto, cpu, gpu, got "gpus" \(did you mean "gpu"\?\)'),
+    ],
+)
+def test_unknown_ways_to_run_are_refused(tmp_path: Path, vary: dict[str, list[str]], message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        study(load(tmp_path, HANGING), vary)

@@ -125,6 +125,8 @@ def test_bad_input_on_the_command_line(tmp_path: Path, run_cli: RunCli) -> None:
     assert both.returncode == 2 and "not allowed with" in both.stderr
     physical = run_cli("tune", scene, "--error", "1mm", "--vary", "friction=0.1,0.2", "-o", out)
     assert physical.returncode == 2 and "axes that do not change what is asked" in physical.stderr
+    run = run_cli("tune", scene, "--error", "1mm", "--vary", "precision=f64,f32", "-o", out)
+    assert run.returncode == 2 and "got precision, which is no part of one" in run.stderr
     assert not out.exists(), "bad input leaves no folder behind"
     assert "example: clothsim study" in run_cli("study", "--help").stdout.replace("\n", " ")
 

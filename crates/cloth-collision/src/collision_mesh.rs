@@ -16,8 +16,8 @@ pub struct Body {
 /// Scene-wide collision topology, built once.
 ///
 /// A pair of features is *admissible* if it shares no vertex; if both are of one body, that body has
-/// `self_collision`; if they are of different bodies, one of these is dynamic; and no feature has a vertex attached
-/// to the other's body. A vertex in no triangle is no part of a surface and meets nothing.
+/// `self_collision`; if they are of different bodies, one of these is dynamic; no feature has a vertex attached
+/// to the other's body; and none has a vertex sewn to one of the other's. A vertex in no triangle is no part of a surface and meets nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CollisionMesh {
     /// Number of vertices of all bodies.
@@ -34,6 +34,8 @@ pub struct CollisionMesh {
     pub bodies: Vec<Body>,
     /// Body to which each vertex is attached, or [`NONE`].
     pub attached_to: Vec<u32>,
+    /// Group of vertices that are sewn together to which each belongs, or [`NONE`]; empty where nothing is sewn.
+    pub sewn: Vec<u32>,
     /// R-triangle assignment: the triangle that tests each vertex for all ([`NONE`]: the vertex is in no triangle).
     pub vertex_owner: Vec<u32>,
     /// R-triangle assignment: the triangle that tests each edge for all.
@@ -116,6 +118,7 @@ impl CollisionMesh {
             vertex_body,
             bodies: bodies.iter().map(|b| b.0).collect(),
             attached_to: vec![NONE; vertex_count],
+            sewn: vec![],
             vertex_owner: vec![],
             edge_owner: vec![],
             vertex_triangles: VertexTriangles::default(),
@@ -154,6 +157,33 @@ impl CollisionMesh {
         self.has_attachments = true;
     }
 
+    /// Declares pairs of vertices that are sewn together: to contact they are as one vertex, so that features that have one
+    /// of each are not tested against each other. What is sewn to the same vertex is sewn together.
+    ///
+    /// # Panics
+    /// If there is no such vertex.
+    pub fn sew(&mut self, pairs: &[[u32; 2]]) {
+        if pairs.is_empty() {
+            return;
+        }
+        // Disjoint sets; the lowest vertex of each stands for it.
+        let mut leader: Vec<u32> = (0..self.vertex_count as u32).collect();
+        let find = |leader: &[u32], mut v: u32| {
+            while leader[v as usize] != v {
+                v = leader[v as usize];
+            }
+            v
+        };
+        for &[a, b] in pairs {
+            let (a, b) = (find(&leader, a), find(&leader, b));
+            leader[a.max(b) as usize] = a.min(b);
+        }
+        self.sewn = vec![NONE; self.vertex_count];
+        for v in pairs.iter().flatten() {
+            self.sewn[*v as usize] = find(&leader, *v);
+        }
+    }
+
     /// Whether features of these two bodies may be in contact at all.
     pub fn bodies_meet(&self, a: u32, b: u32) -> bool {
         let (first, second) = (self.bodies[a as usize], self.bodies[b as usize]);
@@ -189,17 +219,26 @@ impl CollisionMesh {
     }
 
     pub(crate) fn has_attachments(&self) -> bool {
-        self.has_attachments
+        self.has_attachments || !self.sewn.is_empty()
     }
 
-    /// Whether a vertex of one feature is attached to the other's body.
+    /// Whether a vertex of one feature is attached to the other's body, or sewn to a vertex of the other.
     #[inline]
     pub(crate) fn is_attached(&self, first: &[u32], second: &[u32]) -> bool {
+        if !self.sewn.is_empty() && self.is_sewn(first, second) {
+            return true;
+        }
         if !self.has_attachments {
             return false;
         }
         let (a, b) = (self.vertex_body[first[0] as usize], self.vertex_body[second[0] as usize]);
         first.iter().any(|&v| self.attached_to[v as usize] == b)
             || second.iter().any(|&v| self.attached_to[v as usize] == a)
+    }
+
+    fn is_sewn(&self, first: &[u32], second: &[u32]) -> bool {
+        let group = |v: u32| self.sewn[v as usize];
+        let to = |v: u32, w: u32| v != w && group(v) == group(w);
+        first.iter().any(|&v| group(v) != NONE && second.iter().any(|&w| to(v, w)))
     }
 }

@@ -108,6 +108,62 @@ fn rules_of_bodies_and_attachments_agree() {
 }
 
 #[test]
+fn sewn_vertices_are_as_one() {
+    let (mut removed, mut kept) = (0, 0);
+    for seed in 0..4 {
+        let mut random = Random(300 + seed);
+        let (x_t0, triangles) = soup(60, 0.3, &mut random);
+        let x_t1: Vec<Vec3> = x_t0.iter().map(|x| x + random.vector(0.3)).collect();
+        let loose = CollisionMesh::single(x_t0.len(), &triangles).unwrap();
+        // Pairs, and chains where a vertex is drawn twice.
+        let pairs: Vec<[u32; 2]> = (0..30)
+            .map(|_| [(); 2].map(|()| random.below(x_t0.len()) as u32))
+            .filter(|[a, b]| a != b)
+            .collect();
+        let mut sewn = loose.clone();
+        sewn.sew(&pairs);
+        assert!(compare_all(&sewn, &x_t0, &x_t1, &mut random, "sewn") > 100);
+        // What is sewn to what, by walking from pair to pair.
+        let joined = |a: u32, b: u32| {
+            let mut reached = vec![a];
+            while let Some(&[p, q]) = pairs.iter().find(|[p, q]| reached.contains(p) != reached.contains(q)) {
+                reached.push(if reached.contains(&p) { q } else { p });
+            }
+            a != b && reached.contains(&b)
+        };
+        let apart =
+            |first: &[u32], second: &[u32]| !first.iter().any(|&v| second.iter().any(|&w| joined(v, w)));
+        let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.02, mode: Mode::Continuous, active: None };
+        let find =
+            |mesh: &CollisionMesh| Bvh::new(mesh, &x_t0).unwrap().detect(mesh, &query, &pool(1)).unwrap();
+        let (all, some) = (find(&loose), find(&sewn));
+        let expected: Vec<_> = all
+            .vertex_triangle
+            .iter()
+            .filter(|p| apart(&[p[0]], &loose.triangles[p[1] as usize]))
+            .copied()
+            .collect();
+        assert_eq!(some.vertex_triangle, expected);
+        let expected: Vec<_> = all
+            .edge_edge
+            .iter()
+            .filter(|p| apart(&loose.edges[p[0] as usize], &loose.edges[p[1] as usize]))
+            .copied()
+            .collect();
+        assert_eq!(some.edge_edge, expected);
+        kept += expected.len();
+        removed += all.edge_edge.len() - expected.len();
+        let through = |mesh: &CollisionMesh| cloth_collision::intersections(mesh, &x_t0, &pool(1)).unwrap();
+        let expected: Vec<_> = through(&loose)
+            .into_iter()
+            .filter(|p| apart(&loose.triangles[p[0] as usize], &loose.triangles[p[1] as usize]))
+            .collect();
+        assert_eq!(through(&sewn), expected);
+    }
+    assert!(removed > 10 && kept > 1000, "removed {removed}, kept {kept}");
+}
+
+#[test]
 fn what_is_made_on_a_pool_is_the_same() {
     let mut random = Random(8);
     // More triangles than one task takes.

@@ -9,7 +9,7 @@ use std::ops::AddAssign;
 pub struct Energy {
     /// ½ Σ m |v|².
     pub kinetic: f64,
-    /// Springs along edges, or stretch along warp and weft.
+    /// Springs along edges, or stretch along warp and weft; and the stitches of seams.
     pub stretch: f64,
     /// Shear between warp and weft.
     pub shear: f64,

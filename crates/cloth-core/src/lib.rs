@@ -29,7 +29,7 @@ pub use effect::EffectInfo;
 pub use energy::Energy;
 pub use environment::Environment;
 pub use error::{CoreError, StepError};
-pub use forces::Psd;
+pub use forces::{Psd, stitch::Stitch};
 pub use integrator::{ActiveSet, Constraint, Integrator, IntegratorParams, Method, Pins, StepInfo};
 pub use material::{Bending, HingeCoupling, InPlane, Material};
 pub use part::ClothPart;

@@ -13,7 +13,10 @@ use crate::{
     mesh::{NONE, RestShape, Topology, TriMesh},
 };
 
-/// One piece of cloth and where its vertices lie in the global arrays.
+/// One piece of cloth, or the triangles of it that are of one material, and where its vertices lie in the global arrays.
+///
+/// Where a cloth has several materials, each is a part with the same mesh. An edge between two of them belongs to the part
+/// that has its first triangle.
 #[derive(Debug, Clone, Copy)]
 pub struct ClothPart<'a> {
     /// Its mesh; rest angles of hinges are read from these positions.
@@ -26,6 +29,8 @@ pub struct ClothPart<'a> {
     pub material: &'a Material,
     /// Global index of its vertex 0.
     pub first_vertex: usize,
+    /// The triangles that the part has, ascending; by default all of the mesh.
+    pub triangles: Option<&'a [u32]>,
 }
 
 impl ClothPart<'_> {
@@ -43,6 +48,9 @@ impl ClothPart<'_> {
                 return Err(CoreError::Length { name, expected, got });
             }
         }
+        if let Some(&t) = self.triangles.and_then(|own| own.iter().find(|t| **t as usize >= triangles)) {
+            return Err(CoreError::Length { name: "triangles", expected: triangles, got: t as usize + 1 });
+        }
         let got = self.first_vertex + vertices;
         if got > cloth_vertex_count {
             return Err(CoreError::Length { name: "cloth vertices", expected: cloth_vertex_count, got });
@@ -54,8 +62,24 @@ impl ClothPart<'_> {
         local.map(|v| v + self.first_vertex as u32)
     }
 
+    /// The triangles that the part has.
+    pub(crate) fn own_triangles(&self) -> impl Iterator<Item = usize> {
+        let all = if self.triangles.is_none() { self.mesh.triangles.len() } else { 0 };
+        (0..all).chain(self.triangles.into_iter().flatten().map(|&t| t as usize))
+    }
+
+    /// Whether the part has a triangle, and with it the edges of which this is the first.
+    fn has(&self, triangle: u32) -> bool {
+        self.triangles.is_none_or(|own| own.binary_search(&triangle).is_ok())
+    }
+
+    /// The edges that the part has, each with the places of its triangles.
+    fn own_edges(&self) -> impl Iterator<Item = usize> {
+        (0..self.topology.edges.len()).filter(|&e| self.has(self.topology.edge_triangles[e][0]))
+    }
+
     pub(crate) fn global_triangles(&self) -> Vec<[u32; 3]> {
-        self.mesh.triangles.iter().map(|&t| self.global(t)).collect()
+        self.own_triangles().map(|t| self.global(self.mesh.triangles[t])).collect()
     }
 
     pub(crate) fn build_in_plane(
@@ -65,18 +89,27 @@ impl ClothPart<'_> {
     ) -> Result<(), CoreError> {
         match self.material.in_plane {
             InPlane::Spring { stiffness, damping } if stiffness > 0.0 || damping > 0.0 => {
-                let vertices = self.topology.edges.iter().map(|&e| self.global(e)).collect();
-                let lengths = self.edge_lengths();
-                models.push(Box::new(Springs::new(Role::InPlane, stiffness, damping, vertices, lengths)?));
+                let all = self.edge_lengths();
+                let vertices: Vec<_> =
+                    self.own_edges().map(|e| self.global(self.topology.edges[e])).collect();
+                let lengths = self.own_edges().map(|e| all[e]).collect();
+                if !vertices.is_empty() {
+                    models.push(Box::new(Springs::new(
+                        Role::InPlane,
+                        stiffness,
+                        damping,
+                        vertices,
+                        lengths,
+                    )?));
+                }
             }
-            InPlane::BaraffWitkin { warp, weft, shear, damping } if warp.max(weft).max(shear) > 0.0 => {
+            InPlane::BaraffWitkin { warp, weft, shear, damping }
+                if warp.max(weft).max(shear) > 0.0 && !triangles.is_empty() =>
+            {
                 let stiffness = Stiffness { warp, weft, shear, damping };
-                models.push(Box::new(StretchShear::new(
-                    stiffness,
-                    triangles.to_vec(),
-                    &self.rest.inverse,
-                    &self.rest.area,
-                )?));
+                let inverse: Vec<_> = self.own_triangles().map(|t| self.rest.inverse[t]).collect();
+                let area: Vec<_> = self.own_triangles().map(|t| self.rest.area[t]).collect();
+                models.push(Box::new(StretchShear::new(stiffness, triangles.to_vec(), &inverse, &area)?));
             }
             _ => {}
         }
@@ -94,7 +127,7 @@ impl ClothPart<'_> {
             return Ok(());
         }
         self.topology.require_manifold()?;
-        let hinges = &self.topology.hinges;
+        let hinges = self.own_hinges();
         if hinges.is_empty() {
             return Ok(());
         }
@@ -141,7 +174,7 @@ impl ClothPart<'_> {
         rest: Vec<Rest>,
     ) -> Result<Box<dyn ForceModel>, CoreError> {
         let corners = |h: &crate::mesh::Hinge| [h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]];
-        let vertices = self.topology.hinges.iter().map(|h| self.global(corners(h))).collect();
+        let vertices = self.own_hinges().into_iter().map(|h| self.global(corners(h))).collect();
         let hinges = Hinges::new(law, damping, vertices, rest)?;
         Ok(Box::new(match self.material.bending.hinges() {
             Some(HingeCoupling::Coupled) => hinges.coupled(&self.plates()),
@@ -149,10 +182,15 @@ impl ClothPart<'_> {
         }))
     }
 
-    /// The triangles with their hinges.
+    /// The hinges that the part has.
+    fn own_hinges(&self) -> Vec<&crate::mesh::Hinge> {
+        self.topology.hinges.iter().filter(|h| self.has(h.triangles[0])).collect()
+    }
+
+    /// The triangles with those of their hinges that the part has.
     fn plates(&self) -> Vec<Plate> {
         let mut hinge_of = vec![NONE; self.topology.edges.len()];
-        for (k, hinge) in self.topology.hinges.iter().enumerate() {
+        for (k, hinge) in self.own_hinges().into_iter().enumerate() {
             hinge_of[self.edge_of(hinge)] = k as u32;
         }
         let lengths = self.rest.side_lengths.iter().zip(&self.rest.area);

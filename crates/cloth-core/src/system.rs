@@ -11,7 +11,11 @@ use crate::{
         timed,
     },
     bending::HingeState,
-    forces::{ForceModel, Linear, Survey, air::Air},
+    forces::{
+        ForceModel, Linear, Survey,
+        air::Air,
+        stitch::{Stitch, Stitches},
+    },
     mesh::Vec3,
 };
 
@@ -56,9 +60,9 @@ impl ClothSystem {
         for part in parts {
             part.check(cloth_vertex_count)?;
             let global = part.global_triangles();
-            for (triangle, area) in global.iter().zip(&part.rest.area) {
+            for (triangle, t) in global.iter().zip(part.own_triangles()) {
                 for &v in triangle {
-                    masses[v as usize] += part.material.areal_density * area / 3.0;
+                    masses[v as usize] += part.material.areal_density * part.rest.area[t] / 3.0;
                 }
             }
             part.build_in_plane(&global, &mut models)?;
@@ -90,6 +94,44 @@ impl ClothSystem {
             corner_refs,
             apart: None,
         })
+    }
+
+    /// Adds stitches between vertices; none: nothing is built.
+    ///
+    /// # Errors
+    /// [`CoreError::Parameter`] for a gap, stiffness or duration that is negative or not finite; [`CoreError::Length`] for a vertex
+    /// that is not there.
+    pub fn sew(&mut self, stitches: Vec<Stitch>) -> Result<(), CoreError> {
+        for stitch in &stitches {
+            for (name, got) in [
+                ("gap", stitch.gap),
+                ("stiffness", stitch.stiffness),
+                ("duration", stitch.duration),
+                ("start", stitch.start.abs()),
+            ] {
+                if !(got.is_finite() && got >= 0.0) {
+                    return Err(CoreError::Parameter { name, expected: "a finite number ≥ 0", got });
+                }
+            }
+            let last = stitch.vertices[0].max(stitch.vertices[1]) as usize;
+            if last >= self.vertex_count() {
+                let expected = self.vertex_count();
+                return Err(CoreError::Length { name: "vertices of a stitch", expected, got: last + 1 });
+            }
+        }
+        if !stitches.is_empty() {
+            self.models.push(Box::new(Stitches::new(stitches)));
+            self.memory.push(Vec::new());
+            (self.corner_offsets, self.corner_refs) = corners_by_vertex(&self.models, self.masses.len());
+        }
+        Ok(())
+    }
+
+    /// Says at which time \[s\] forces and energy are asked for: seams close over time.
+    pub(crate) fn set_time(&mut self, time: f64) {
+        for model in &mut self.models {
+            model.set_time(time);
+        }
     }
 
     /// Moves all models that resist bending into a system of their own, [`Self::apart`].

@@ -223,6 +223,7 @@ fn two_parts_do_not_couple_with_each_other() {
         rest: &rest,
         material: &SOFT,
         first_vertex,
+        triangles: None,
     };
     let n = mesh.vertices.len();
     let env = Environment { gravity: Vec3::zeros(), ..Environment::default() };

@@ -126,6 +126,7 @@ fn several_parts_share_one_vertex_array() {
         rest: &rest,
         material,
         first_vertex,
+        triangles: None,
     };
     let env = Environment::default();
     let both = ClothSystem::new(&[part(&SOFT, 0), part(&SPRINGS, 16)], &env, 32).unwrap();
@@ -193,7 +194,14 @@ fn bending_across_a_fan_of_three_triangles_is_refused_and_stretch_is_not() {
     let topology = Topology::new(5, &mesh.triangles);
     let rest = RestShape::new(&mesh, Vec3::x()).unwrap();
     let build = |material: &Material| {
-        let part = ClothPart { mesh: &mesh, topology: &topology, rest: &rest, material, first_vertex: 0 };
+        let part = ClothPart {
+            mesh: &mesh,
+            topology: &topology,
+            rest: &rest,
+            material,
+            first_vertex: 0,
+            triangles: None,
+        };
         ClothSystem::new(&[part], &Environment::default(), 5).map(|_| ())
     };
     assert!(matches!(build(&SOFT), Err(CoreError::Mesh(_))));
@@ -217,4 +225,48 @@ fn parameters_read_as_in_a_scene_file() {
     let params: IntegratorParams =
         serde_json::from_str(r#"{"method": "implicit-newton", "solver": {"method": "faer-llt"}}"#).unwrap();
     assert_eq!(params.solver.tolerance, 1e-4);
+}
+
+#[test]
+fn parts_of_one_mesh_add_up_to_it() {
+    let mesh = sheet(1.0, 6);
+    let n = mesh.vertices.len();
+    let topology = Topology::new(n, &mesh.triangles);
+    let rest = RestShape::new(&mesh, Vec3::x()).unwrap();
+    let (left, right): (Vec<u32>, Vec<u32>) = (0..mesh.triangles.len() as u32).partition(|t| t % 7 < 3);
+    let env = Environment { air_density: 1.2, drag: 0.5, ..Environment::default() };
+    let (x, v) = wavy(&mesh, 0.05, 0.4);
+    let forces = |materials: [Material; 2], lists: [Option<&[u32]>; 2]| {
+        let parts: Vec<_> = materials
+            .iter()
+            .zip(lists)
+            .filter(|(_, list)| list.is_none_or(|list| !list.is_empty()))
+            .map(|(material, triangles)| ClothPart {
+                mesh: &mesh,
+                topology: &topology,
+                rest: &rest,
+                material,
+                first_vertex: 0,
+                triangles,
+            })
+            .collect();
+        let system = ClothSystem::new(&parts, &env, n).unwrap();
+        let mut f = vec![Vec3::zeros(); n];
+        system.forces(&x, &v, &mut f, &pool(1));
+        (f, system.masses().to_vec())
+    };
+    let far = |a: &[Vec3], b: &[Vec3]| a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    for mut material in [SOFT, SPRINGS] {
+        // Hinges of two parts do not couple; alone each is in one part.
+        material.bending = material.bending.with_hinges(HingeCoupling::Independent);
+        let (whole, masses) = forces([material; 2], [None, Some(&[])]);
+        let (split, split_masses) = forces([material; 2], [Some(&left), Some(&right)]);
+        let scale = whole.iter().map(Vec3::norm).fold(0.0, f64::max);
+        // Sums in another order.
+        assert!(far(&whole, &split) <= 1e-12 * scale);
+        assert!(masses.iter().zip(&split_masses).all(|(a, b)| (a - b).abs() <= 1e-14 * a));
+        let other = Material { areal_density: 2.0 * material.areal_density, ..material };
+        let (heavier, _) = forces([material, other], [Some(&left), Some(&right)]);
+        assert!(far(&whole, &heavier) > 1e-3 * scale, "a material of its own is seen");
+    }
 }

@@ -156,6 +156,9 @@ impl Chunk {
                 part.set_attachment(v as u32, mesh.attached_to[whole as usize]);
             }
         }
+        if !mesh.sewn.is_empty() {
+            part.sewn = vertices.iter().map(|&whole| mesh.sewn[whole as usize]).collect();
+        }
         let pick = |x: &[Vec3]| vertices.iter().map(|&v| x[v as usize]).collect();
         Ok(Self {
             mesh: part,

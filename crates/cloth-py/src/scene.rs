@@ -39,9 +39,9 @@ impl PyScene {
         self.scene.to_json().map_err(|error| scene_error(py, &error))
     }
 
-    /// The files that the scene names: path as written, whether it is an animated mesh, key in the scene.
-    fn files(&self) -> Vec<(String, bool, String)> {
-        self.scene.files().into_iter().map(|file| (file.path, file.sequence, file.key)).collect()
+    /// The files that the scene names: path as written, whether it is an animated mesh, key in the scene, name of the asset.
+    fn files(&self) -> Vec<(String, bool, String, String)> {
+        self.scene.files().into_iter().map(|file| (file.path, file.sequence, file.key, file.asset)).collect()
     }
 
     /// Raise the error that `key` has a wrong value, with file and line where the scene was read from a file.

@@ -2,6 +2,7 @@
 //!
 //! The lock is taken after the interpreter is released, so that a thread that waits for it holds nobody up.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -19,6 +20,10 @@ use crate::scene::PyScene;
 /// Name, kind, vertex range in the global array, and the mesh's triangles and UV (with no vertices).
 type BodyTuple<'py> = (String, &'static str, (usize, usize), Arrays<'py>);
 
+/// Vertices, triangles and UV of a mesh, and its groups of triangles by name.
+type MeshTuple<'py> =
+    (Bound<'py, PyAny>, Bound<'py, PyAny>, Option<Bound<'py, PyAny>>, BTreeMap<String, Vec<u32>>);
+
 /// A scene being simulated.
 #[pyclass(frozen, module = "clothsim._core", name = "Simulation")]
 pub(crate) struct PySimulation {
@@ -28,7 +33,7 @@ pub(crate) struct PySimulation {
 #[pymethods]
 impl PySimulation {
     #[new]
-    #[pyo3(signature = (scene, meshes, sequences, velocities, threads, device, allow_intersections))]
+    #[pyo3(signature = (scene, meshes, sequences, velocities, threads, device, allow_intersections, start))]
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyScene>,
@@ -38,19 +43,24 @@ impl PySimulation {
         threads: Option<usize>,
         device: &str,
         allow_intersections: bool,
+        start: Option<(f64, Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<Self> {
         let mut assets = Assets::default();
         for (name, arrays) in meshes {
-            let (vertices, triangles, uv): (Bound<'_, PyAny>, Bound<'_, PyAny>, Option<Bound<'_, PyAny>>) =
-                arrays.extract()?;
-            assets.meshes.insert(name.extract()?, mesh_from(&vertices, &triangles, uv.as_ref())?);
+            let (vertices, triangles, uv, groups): MeshTuple<'_> = arrays.extract()?;
+            let name: String = name.extract()?;
+            assets.meshes.insert(name.clone(), mesh_from(&vertices, &triangles, uv.as_ref())?);
+            if !groups.is_empty() {
+                assets.groups.insert(name, groups);
+            }
         }
         for (name, arrays) in sequences {
-            let (frames, triangles): (Bound<'_, PyAny>, Bound<'_, PyAny>) = arrays.extract()?;
+            let (frames, triangles, fps): (Bound<'_, PyAny>, Bound<'_, PyAny>, Option<f64>) =
+                arrays.extract()?;
             let frames = frames_from(&frames, "positions")?;
             let vertex_count = frames.first().map_or(0, Vec::len);
             let triangles = triangles_from(&triangles, "triangles", vertex_count)?;
-            assets.sequences.insert(name.extract()?, Sequence { triangles, frames });
+            assets.sequences.insert(name.extract()?, Sequence { triangles, frames, fps });
         }
         for (name, array) in velocities {
             assets.velocities.insert(name.extract()?, vertices_from(&array, "velocities")?);
@@ -59,8 +69,20 @@ impl PySimulation {
         let options =
             SimulationOptions { threads, allow_intersections, device, ..SimulationOptions::default() };
         let scene = &scene.get().scene;
+        let start = match start {
+            Some((time, x, v)) => {
+                Some((time, vertices_from(&x, "positions")?, vertices_from(&v, "velocities")?))
+            }
+            None => None,
+        };
         let simulation = py
-            .detach(|| Simulation::new(scene, assets, options).map_err(Box::new))
+            .detach(|| {
+                match &start {
+                    Some((time, x, v)) => Simulation::start_from(scene, assets, options, *time, x, v),
+                    None => Simulation::new(scene, assets, options),
+                }
+                .map_err(Box::new)
+            })
             .map_err(|error| sim_error(py, &error))?;
         Ok(Self { simulation: Mutex::new(simulation) })
     }
@@ -80,6 +102,11 @@ impl PySimulation {
     /// Take one step of the scene's size.
     fn step(&self, py: Python<'_>) -> PyResult<()> {
         self.detached(py, |simulation| simulation.step().map_err(Box::new))
+    }
+
+    /// Round positions and velocities of the cloth to f32.
+    fn round_state(&self, py: Python<'_>) {
+        py.detach(|| self.lock().round_state());
     }
 
     /// Advance in equal steps; Ctrl-C is looked for before each. Returns the number of steps.

@@ -1,12 +1,14 @@
 //! From the scene and its assets to checked meshes in place.
 
 use crate::motion::Motion;
+use crate::regions::{self, Part};
 use crate::scene::{Cloth, Collider, DiagonalPattern, Generator, MeshSource, RestSource};
 use crate::scene::{LENGTH, VELOCITY};
+use crate::seams::{self, Seams};
 use crate::{Assets, Scene, SceneError, Vec3};
 use cloth_collision::{DetectError, shapes};
 use cloth_core::mesh::{MeshError, RestShape, Topology, TriMesh, generators};
-use cloth_core::{InPlane, Material};
+use cloth_core::{InPlane, Material, Stitch};
 use cloth_response::LimitedEdge;
 use std::ops::Range;
 
@@ -41,6 +43,10 @@ pub(crate) struct ClothBody {
     pub(crate) topology: Topology,
     pub(crate) rest: RestShape,
     pub(crate) material: Material,
+    /// Its triangles by material; empty where all are of `material`.
+    pub(crate) parts: Vec<Part>,
+    /// Its seams, over its own vertices.
+    pub(crate) seams: Seams,
     pub(crate) first_vertex: usize,
     /// Start positions [m] and velocities [m/s], before pins.
     pub(crate) x: Vec<Vec3>,
@@ -104,6 +110,28 @@ impl Bodies {
             colliders.push(body);
         }
         Ok(Self { cloth, colliders, cloth_vertices, vertices: next })
+    }
+
+    /// All stitches, over the global vertices.
+    pub(crate) fn stitches(&self) -> Vec<Stitch> {
+        let of = |body: &ClothBody| {
+            let first = body.first_vertex as u32;
+            body.seams
+                .stitches
+                .iter()
+                .map(move |s| Stitch { vertices: s.vertices.map(|v| v + first), ..*s })
+                .collect::<Vec<_>>()
+        };
+        self.cloth.iter().flat_map(of).collect()
+    }
+
+    /// Vertices that are as one to contact, over the global vertices.
+    pub(crate) fn joined(&self) -> Vec<[u32; 2]> {
+        let of = |body: &ClothBody| {
+            let first = body.first_vertex as u32;
+            body.seams.joined.iter().map(|pair| pair.map(|v| v + first)).collect::<Vec<_>>()
+        };
+        self.cloth.iter().flat_map(of).collect()
     }
 
     /// The edges whose strain the scene limits, but for those between two of the `pinned` vertices (sorted), whose length
@@ -170,13 +198,18 @@ fn cloth_body(
     scene.check_points(&mesh_key, &mesh.vertices, LENGTH, "m", vertex_of(&source.name))?;
     mesh.check().map_err(defect)?;
     let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
-    let material = scene.resolve_material(source, key)?;
-    if !matches!(material.bending, cloth_core::Bending::None) {
+    let material = scene.resolve_material(&source.material, &format!("{key}.material"))?;
+    let pose = crate::motion::pose(source.position, source.rotation.as_ref());
+    let x: Vec<Vec3> = mesh.vertices.iter().map(|p| pose.transform_point(&(*p).into()).coords).collect();
+    let parts = regions::parts(scene, assets, source, material, &mesh, &x, key)?;
+    let materials: Vec<Material> =
+        if parts.is_empty() { vec![material] } else { parts.iter().map(|p| p.0).collect() };
+    if materials.iter().any(|m| !matches!(m.bending, cloth_core::Bending::None)) {
         topology.require_manifold().map_err(defect)?;
     }
     let rest = match (source.rest, &mesh.uv) {
         (RestSource::Mesh, _) => {
-            check_warp(scene, source, &mesh, &material, key)?;
+            check_warp(scene, source, &mesh, &materials, key)?;
             RestShape::from_positions(&mesh, Vec3::from(source.warp))
         }
         (RestSource::Uv, Some(uv)) => RestShape::from_uv(uv),
@@ -186,8 +219,7 @@ fn cloth_body(
         }
     }
     .map_err(defect)?;
-    let pose = crate::motion::pose(source.position, source.rotation.as_ref());
-    let x: Vec<Vec3> = mesh.vertices.iter().map(|p| pose.transform_point(&(*p).into()).coords).collect();
+    let seams = seams::build(scene, source, &materials, &mesh, (&topology, &rest), &x, key)?;
     let mut v = vec![Vec3::from(source.velocity); x.len()];
     if let Some(name) = &source.velocities {
         let key = format!("{key}.velocities");
@@ -207,7 +239,7 @@ fn cloth_body(
             *own += more;
         }
     }
-    Ok(ClothBody { mesh, topology, rest, material, first_vertex, x, v })
+    Ok(ClothBody { mesh, topology, rest, material, parts, seams, first_vertex, x, v })
 }
 
 /// Refuses a warp that most of a cloth has along its normal: projected into the cloth it gives no direction.
@@ -217,12 +249,12 @@ fn check_warp(
     scene: &Scene,
     source: &Cloth,
     mesh: &TriMesh,
-    material: &Material,
+    materials: &[Material],
     key: &str,
 ) -> Result<(), SceneError> {
     /// Sine of the least angle between warp and normal that gives a direction.
     const LEAST_SINE: f64 = 1e-6;
-    if !matches!(material.in_plane, InPlane::BaraffWitkin { .. }) {
+    if !materials.iter().any(|m| matches!(m.in_plane, InPlane::BaraffWitkin { .. })) {
         return Ok(());
     }
     let warp = Vec3::from(source.warp).normalize();
@@ -253,7 +285,7 @@ fn collider_body(
     first_vertex: usize,
 ) -> Result<ColliderBody, SceneError> {
     if let Some(sequence) = &source.sequence {
-        let name = sequence.file.as_ref().or(sequence.asset.as_ref()).cloned().unwrap_or_default();
+        let name = sequence.asset_name();
         let key = format!("{key}.sequence");
         let asset = assets
             .sequences
@@ -276,7 +308,11 @@ fn collider_body(
         }
         let mesh = TriMesh { vertices: first.clone(), triangles: asset.triangles.clone(), uv: None };
         mesh.check().map_err(|error| mesh_error(scene, &key, &source.name, &error))?;
-        let motion = Motion::sequence(asset, sequence, source);
+        let Some(fps) = sequence.fps.or(asset.fps) else {
+            let expected = "frames per second > 0, which this file does not say";
+            return Err(scene.error(&format!("{key}.fps"), expected, "nothing"));
+        };
+        let motion = Motion::sequence(asset, fps, sequence, source);
         return Ok(ColliderBody { triangles: mesh.triangles, uv: None, first_vertex, motion });
     }
     let mesh = if let Some(shape) = &source.shape {

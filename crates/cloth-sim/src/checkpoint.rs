@@ -11,7 +11,7 @@ use cloth_core::mesh::TriMesh;
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
@@ -210,9 +210,22 @@ impl Writer {
         for (name, sequence) in &assets.sequences {
             self.text(name);
             self.triangles(&sequence.triangles);
+            self.f64(sequence.fps.unwrap_or(0.0));
             self.u64(sequence.frames.len() as u64);
             for frame in &sequence.frames {
                 self.points(frame);
+            }
+        }
+        self.u64(assets.groups.len() as u64);
+        for (name, groups) in &assets.groups {
+            self.text(name);
+            self.u64(groups.len() as u64);
+            for (group, triangles) in groups {
+                self.text(group);
+                self.u64(triangles.len() as u64);
+                for t in triangles {
+                    self.0.extend(t.to_le_bytes());
+                }
             }
         }
         self.u64(assets.velocities.len() as u64);
@@ -297,11 +310,18 @@ impl Reader<'_> {
         })?;
         let sequences = self.map(|r| {
             let triangles = r.triangles()?;
+            let fps = Some(r.f64()?).filter(|fps| *fps > 0.0);
             let count = r.count(8)?;
             let frames = (0..count).map(|_| r.points()).collect::<Result<_, _>>()?;
-            Ok(Sequence { triangles, frames })
+            Ok(Sequence { triangles, frames, fps })
+        })?;
+        let groups = self.map(|r| {
+            r.map(|r| {
+                let count = r.count(4)?;
+                (0..count).map(|_| Ok(u32::from_le_bytes(r.array()?))).collect()
+            })
         })?;
         let velocities = self.map(Reader::points)?;
-        Ok(Assets { meshes, sequences, velocities })
+        Ok(Assets { meshes, sequences, groups, velocities })
     }
 }

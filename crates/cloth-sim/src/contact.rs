@@ -49,6 +49,7 @@ impl ContactStage {
         for &(vertex, collider) in &pins.attachments {
             mesh.set_attachment(vertex, (bodies.cloth.len() + collider) as u32);
         }
+        mesh.sew(&bodies.joined());
         let bvh = Bvh::new(&mesh, x).map_err(|e| stage("collision mesh", &e))?;
         let continuous = if meets {
             Continuous::choose(&contact.detector, options.device, options.gpu, &mesh, x)
@@ -98,6 +99,7 @@ impl ContactStage {
             + size_of_val(&mesh.triangle_edges[..])
             + size_of_val(&mesh.vertex_body[..])
             + size_of_val(&mesh.attached_to[..])
+            + size_of_val(&mesh.sewn[..])
             + size_of_val(&mesh.vertex_owner[..])
             + size_of_val(&mesh.edge_owner[..])
             + mesh.vertex_triangles.bytes()

@@ -29,7 +29,11 @@ mod guard;
 mod motion;
 mod pins;
 mod plan;
+mod precision;
+mod regions;
 mod report;
+mod restart;
+mod seams;
 mod simulation;
 mod step;
 

@@ -110,15 +110,11 @@ impl Motion {
     }
 
     /// The frames, placed by the collider's position and rotation.
-    pub(crate) fn sequence(asset: &Sequence, source: &SequenceSource, collider: &Collider) -> Self {
+    pub(crate) fn sequence(asset: &Sequence, fps: f64, source: &SequenceSource, collider: &Collider) -> Self {
         let pose = pose(collider.position, collider.rotation.as_ref());
         let place =
             |frame: &Vec<Vec3>| frame.iter().map(|p| pose.transform_point(&(*p).into()).coords).collect();
-        Self::Sequence {
-            frames: asset.frames.iter().map(place).collect(),
-            fps: source.fps,
-            start: source.start,
-        }
+        Self::Sequence { frames: asset.frames.iter().map(place).collect(), fps, start: source.start }
     }
 
     pub(crate) fn vertex_count(&self) -> usize {

@@ -93,7 +93,7 @@ fn bytes(count: usize) -> String {
 }
 
 /// Effects of the dynamics that a scene may call for, what calls for them, and what is the case where nothing does.
-const DYNAMICS: [(&str, &str, &str); 10] = [
+const DYNAMICS: [(&str, &str, &str); 11] = [
     ("gravity", "gravity is not zero", "gravity is zero"),
     ("wind", "air.drag or air.lift is above zero", "air.density, or air.drag and air.lift, are zero"),
     ("air-damping", "air.damping is above zero", "air.damping is zero"),
@@ -111,6 +111,7 @@ const DYNAMICS: [(&str, &str, &str); 10] = [
     ("hinge", "bending.model = \"hinge\"", "no material has bending.model = \"hinge\" with a rigidity"),
     ("nonlinear", "bending.model = \"nonlinear\"", "no material has bending.model = \"nonlinear\""),
     ("plastic", "bending.model = \"plastic\"", "no material has bending.model = \"plastic\""),
+    ("stitches", "cloth with seams", "no cloth has seams"),
     ("hysteresis", "bending.model = \"hysteresis\"", "no material has bending.model = \"hysteresis\""),
 ];
 

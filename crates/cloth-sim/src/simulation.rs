@@ -1,6 +1,6 @@
 //! The engine as one object: built from a scene, stepped, asked.
 
-use crate::bodies::Bodies;
+use crate::bodies::{Bodies, ClothBody};
 use crate::contact::ContactStage;
 use crate::device::{Device, SharedGpu};
 use crate::guard::Guard;
@@ -113,28 +113,20 @@ impl Simulation {
         };
 
         let pool = Arc::new(thread_pool(options.threads)?);
-        let parts: Vec<ClothPart<'_>> = bodies
-            .cloth
-            .iter()
-            .map(|body| ClothPart {
-                mesh: &body.mesh,
-                topology: &body.topology,
-                rest: &body.rest,
-                material: &body.material,
-                first_vertex: body.first_vertex,
-            })
-            .collect();
+        let parts: Vec<ClothPart<'_>> = bodies.cloth.iter().flat_map(cloth_parts).collect();
         let core_error =
             |error: cloth_core::CoreError| SimError::InvalidScene(plan::core_error(scene, &error));
-        let system =
+        let mut system =
             ClothSystem::new(&parts, &environment(scene), bodies.cloth_vertices).map_err(core_error)?;
+        system.sew(bodies.stitches()).map_err(core_error)?;
         let mut inv_mass: Vec<f64> = system.masses().iter().map(|m| m.recip()).collect();
         inv_mass.resize(bodies.vertices, 0.0);
         for &v in &pins.vertices {
             inv_mass[v as usize] = 0.0;
         }
-        let integrator =
+        let mut integrator =
             Integrator::new(system, integrator_params(scene), Arc::clone(&pool)).map_err(core_error)?;
+        integrator.set_time(state.time);
         let mut contact = match &scene.contact {
             Some(contact) => Some(ContactStage::new(scene, contact, options, &bodies, &pins, &state.x)?),
             // Strain limits are met by the response, also where there is no contact.
@@ -339,7 +331,7 @@ impl Simulation {
         }
     }
 
-    fn check_start(&self) -> Result<(), SimError> {
+    pub(crate) fn check_start(&self) -> Result<(), SimError> {
         /// Pairs listed in an error.
         const LISTED: usize = 64;
         /// Pairs put in words.
@@ -375,6 +367,23 @@ impl Simulation {
         }
         format!("triangle {triangle}")
     }
+}
+
+/// A cloth as a part of one material, or as its parts.
+fn cloth_parts(body: &ClothBody) -> Vec<ClothPart<'_>> {
+    let ClothBody { mesh, topology, rest, first_vertex, .. } = body;
+    let part = |material, triangles| ClothPart {
+        mesh,
+        topology,
+        rest,
+        material,
+        first_vertex: *first_vertex,
+        triangles,
+    };
+    if body.parts.is_empty() {
+        return vec![part(&body.material, None)];
+    }
+    body.parts.iter().map(|(material, triangles)| part(material, Some(triangles.as_slice()))).collect()
 }
 
 fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, SimError> {

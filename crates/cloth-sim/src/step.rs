@@ -31,6 +31,11 @@ pub(crate) struct State {
 impl State {
     /// Cloth as placed, colliders at t = 0.
     pub(crate) fn start(bodies: &Bodies) -> Self {
+        Self::start_at(bodies, 0.0)
+    }
+
+    /// Cloth as placed, colliders where they are at `time` \[s\].
+    pub(crate) fn start_at(bodies: &Bodies, time: f64) -> Self {
         let mut x = Vec::with_capacity(bodies.vertices);
         let mut v = Vec::with_capacity(bodies.vertices);
         for body in &bodies.cloth {
@@ -41,15 +46,15 @@ impl State {
         v.resize(bodies.vertices, Vec3::zeros());
         for body in &bodies.colliders {
             let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
-            body.motion.write(0.0, &mut x[range]);
+            body.motion.write(time, &mut x[range]);
         }
-        Self { time: 0.0, step: 0, x, v, contact_force: Vec::new(), holds: Holds::default() }
+        Self { time, step: 0, x, v, contact_force: Vec::new(), holds: Holds::default() }
     }
 
     /// Moves pinned vertices to where their motion starts, at rest.
     pub(crate) fn place_pins(&mut self, bodies: &Bodies, pins: &PinSet) {
         let mut targets = vec![Vec3::zeros(); pins.vertices.len()];
-        pins.write(bodies, 0.0, &self.x, &mut targets);
+        pins.write(bodies, self.time, &self.x, &mut targets);
         for (&v, target) in pins.vertices.iter().zip(targets) {
             self.x[v as usize] = target;
             self.v[v as usize] = Vec3::zeros();
@@ -136,6 +141,7 @@ impl Simulation {
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
         let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
+        self.integrator.set_time(t1);
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let v_free = self.contact.is_some().then(|| v.clone());

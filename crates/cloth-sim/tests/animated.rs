@@ -20,7 +20,7 @@ fn walker() -> Sequence {
         };
         sheet.vertices.iter().map(|p| p + Vec3::y() * height(p)).collect()
     };
-    Sequence { triangles: sheet.triangles.clone(), frames: (0..=6).map(frame).collect() }
+    Sequence { triangles: sheet.triangles.clone(), frames: (0..=6).map(frame).collect(), fps: None }
 }
 
 /// Cloth on the animated sheet.

@@ -129,7 +129,7 @@ fn sequences_are_checked() {
     let walk = |frames: Vec<Vec<Vec3>>| {
         let mut assets = Assets::default();
         let triangles = vec![[0, 1, 2]];
-        assets.sequences.insert("walk".into(), cloth_sim::Sequence { triangles, frames });
+        assets.sequences.insert("walk".into(), cloth_sim::Sequence { triangles, frames, fps: None });
         assets
     };
     let good = vec![Vec3::zeros(), Vec3::x(), Vec3::y()];

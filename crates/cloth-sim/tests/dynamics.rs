@@ -189,6 +189,7 @@ sequence = {{ asset = "walk", fps = 10.0 }}
         cloth_sim::Sequence {
             triangles: vec![[0, 2, 1]],
             frames: vec![frame(0.0), frame(0.01), frame(0.03)],
+            fps: None,
         },
     );
     let mut sim = Simulation::new(&scene, assets, SimulationOptions::default()).unwrap();

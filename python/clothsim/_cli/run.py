@@ -8,10 +8,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from clothsim._cli.arguments import add_existing, add_out, count
+from clothsim._cli.arguments import add_existing, add_out, count, folder
 from clothsim._cli.device import add_device
+from clothsim._cli.export import read_run
 from clothsim._device import check_device, check_threads
 from clothsim._run.job import Job, Stopped
+from clothsim._run.start import Start
+from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
@@ -35,14 +38,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="run from a start state in which triangles pass through others",
     )
+    parser.add_argument(
+        "--from",
+        dest="run",
+        metavar="RUN",
+        type=folder,
+        help="go on from a frame of this finished run (or frames.npz)",
+    )
+    parser.add_argument(
+        "--frame", metavar="N", type=int, help="number of that frame (default: the last; -2: the one before)"
+    )
     add_existing(parser, "run")
 
 
 def execute(options: argparse.Namespace) -> int:
     """Run the job and say what came of it."""
     check_device(options.device)
+    scene = Scene.load(options.scene)
+    start = None
+    if options.run is not None:
+        start = Start.of(read_run(options.run), scene, -1 if options.frame is None else options.frame)
+        if start.estimated and not (options.quiet or options.json):
+            print(
+                "warning: the run kept no velocities; they are differences of its frames (output.velocities = true)",
+                file=sys.stderr,
+            )
+    elif options.frame is not None:
+        raise InvalidInput("--frame: expected --from RUN with it, got --frame alone", name="--frame")
     job = Job(
-        Scene.load(options.scene),
+        scene,
         options.out,
         threads=check_threads(options.threads),
         device=options.device,
@@ -51,12 +75,15 @@ def execute(options: argparse.Namespace) -> int:
         resume=options.resume,
         overwrite=options.overwrite,
         progress=not (options.quiet or options.json),
+        start=start,
     )
     try:
         report = job.run()
     except Stopped as stop:
         device = "" if options.device == "auto" else f" --device {options.device}"
-        again = f"clothsim run {options.scene} -o {options.out}{device} --resume"
+        begin = "" if options.run is None else f" --from {options.run}"
+        begin += "" if options.frame is None else f" --frame {options.frame}"
+        again = f"clothsim run {options.scene} -o {options.out}{begin}{device} --resume"
         if options.json:
             print(json.dumps({"stopped": str(stop), "frames": stop.frames, "of": stop.total, "resume": again}))
         print(

@@ -29,12 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--vary", metavar="AXIS=VALUES", action="append", default=[],
         help="values of an axis, by commas, or first:last:count (geometric); an axis is one of dt, integrator, "
-        "resolution, solver, solver_tolerance, bending, hinges, fabric, friction, detector, … or any key of the scene",
+        "resolution, solver, solver_tolerance, bending, hinges, fabric, friction, detector, precision, … or any key of "
+        "the scene",
     )  # fmt: skip
     parser.add_argument(
         "--metric", metavar="NAMES", action="append", default=[],
         help="what to measure: rms (default), max, shape, energy_drift, momentum_drift, spin_drift, contact_error, "
-        "stick_drift, drape, lowest, strain_energy; the front is about the first",
+        "stick_drift, drape, lowest, strain_energy, kinetic_energy; the front is about the first",
     )  # fmt: skip
     add_common(parser)
     parser.add_argument("--sample", metavar="N", type=count, help="run a seeded sample of N combinations")

@@ -11,7 +11,7 @@ from clothsim._arrays import Floats, Ints, optional
 from clothsim._files import replacing
 from clothsim.recording import Body, Recording
 
-__all__ = ["write"]
+__all__ = ["body_colour", "vertex_normals", "write"]
 
 
 def write(recording: Recording, path: Path) -> None:
@@ -29,17 +29,23 @@ def write(recording: Recording, path: Path) -> None:
         pxr.UsdGeom.SetStageUpAxis(stage, pxr.UsdGeom.Tokens.z if recording.up == "z" else pxr.UsdGeom.Tokens.y)
         stage.SetTimeCodesPerSecond(recording.fps)
         stage.SetFramesPerSecond(recording.fps)
-        stage.SetStartTimeCode(0)
-        stage.SetEndTimeCode(max(0, len(recording) - 1))
+        first = first_code(recording)
+        stage.SetStartTimeCode(first)
+        stage.SetEndTimeCode(first + max(0, len(recording) - 1))
         stage.SetMetadata("comment", f"clothsim: {recording.name}" if recording.name else "clothsim")
         used: set[str] = set()
         for number, body in enumerate(recording.bodies):
             name = _prim_name(pxr, body.name, used)
-            material = _material(pxr, stage, f"/World/Looks/{name}", _colour(body, number))
-            prim = _mesh(pxr, stage, f"/World/{name}", recording, body, _colour(body, number))
+            material = _material(pxr, stage, f"/World/Looks/{name}", body_colour(body, number))
+            prim = _mesh(pxr, stage, f"/World/{name}", recording, body, body_colour(body, number))
             pxr.UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
         stage.GetRootLayer().Save()
         del stage
+
+
+def first_code(recording: Recording) -> int:
+    """Time code of the first frame: 0, or in a run that went on from a frame the number of that."""
+    return round(float(recording.times[0]) * recording.fps) if len(recording) else 0
 
 
 class _Pxr:
@@ -65,7 +71,7 @@ def _mesh(
     points, extent, normals = mesh.CreatePointsAttr(), mesh.CreateExtentAttr(), mesh.CreateNormalsAttr()
     mesh.SetNormalsInterpolation(pxr.UsdGeom.Tokens.vertex)
     for frame in range(1 if body.static else len(recording)):
-        at = pxr.Usd.TimeCode.Default() if body.static else pxr.Usd.TimeCode(frame)
+        at = pxr.Usd.TimeCode.Default() if body.static else pxr.Usd.TimeCode(first_code(recording) + frame)
         x = recording.positions(body, frame).astype(np.float32)
         points.Set(pxr.Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(x)), at)
         n = vertex_normals(x.astype(np.float64), body.triangles).astype(np.float32)
@@ -97,7 +103,8 @@ def _material(pxr: _Pxr, stage: Any, prim_path: str, colour: tuple[float, float,
     return material
 
 
-def _colour(body: Body, number: int) -> tuple[float, float, float]:
+def body_colour(body: Body, number: int) -> tuple[float, float, float]:
+    """Base colour of a body (linear RGB): grey for colliders, one of four for the cloths."""
     if body.kind == "collider":
         return (0.55, 0.56, 0.58)
     cloths = ((0.62, 0.13, 0.17), (0.13, 0.30, 0.52), (0.80, 0.58, 0.20), (0.20, 0.45, 0.32))

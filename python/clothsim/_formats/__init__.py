@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,16 +11,22 @@ from clothsim.errors import MeshError
 
 __all__ = ["READABLE", "WRITABLE", "RawMesh", "parse", "read", "write"]
 
-READABLE = (".obj", ".ply", ".stl", ".gltf", ".glb")
+_USD = (".usd", ".usda", ".usdc", ".usdz")
+READABLE = (".obj", ".ply", ".stl", ".gltf", ".glb", *_USD)
 WRITABLE = (".obj", ".ply")
 
 
 class RawMesh(NamedTuple):
-    """What a file holds: positions (n, 3), triangles (m, 3) and UV per corner (m, 3, 2) if every corner has one."""
+    """What a file holds.
+
+    Positions (n, 3), triangles (m, 3), UV per corner (m, 3, 2) if every corner has one, and the triangles of each named
+    group, ascending, if the format has groups.
+    """
 
     vertices: Floats
     triangles: Ints
     uv: Floats | None
+    groups: Mapping[str, Ints] | None = None
 
 
 def read(path: Path) -> RawMesh:
@@ -47,6 +54,10 @@ def parse(content: bytes, path: Path) -> RawMesh:
         from clothsim._formats import ply
 
         return ply.parse(content, str(path))
+    if suffix in _USD:
+        from clothsim._formats import usd
+
+        return usd.load_still(path)
     from clothsim._formats import soup
 
     return soup.load(path)

@@ -20,13 +20,16 @@ __all__ = ["dump", "parse"]
 
 
 def parse(content: bytes, name: str) -> RawMesh:
-    """Parse the text of an OBJ file; ``name`` is for messages. Groups, materials, normals, lines are passed over.
+    """Parse the text of an OBJ file; ``name`` is for messages. Normals and lines are passed over.
 
-    UV is given only if every corner of every face names one.
+    UV is given only if every corner of every face names one. Groups are what ``g`` (several names at once), ``o`` and
+    ``usemtl`` say of the faces after them.
     """
     vertices: list[tuple[float, float, float]] = []
     coordinates: list[tuple[float, float]] = []
     faces: list[tuple[list[int], list[int]]] = []
+    current: dict[str, list[str]] = {"g": [], "o": [], "usemtl": []}
+    members: dict[str, list[int]] = {}
     text = content.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split()
@@ -38,18 +41,25 @@ def parse(content: bytes, name: str) -> RawMesh:
             elif words[0] == "vt":
                 coordinates.append((float(words[1]), float(words[2]) if len(words) > 2 else 0.0))
             elif words[0] == "f":
+                for group in dict.fromkeys(name for names in current.values() for name in names):
+                    members.setdefault(group, []).append(len(faces))
                 faces.append(_face(words[1:], len(vertices), len(coordinates)))
+            elif words[0] == "g":
+                current["g"] = words[1:]
+            elif words[0] in ("o", "usemtl"):
+                current[words[0]] = [line.split(maxsplit=1)[1].strip()] if len(words) > 1 else []
         except (ValueError, IndexError) as error:
             text = line.strip()
             raise MeshError(f"{name}, line {number}: cannot understand {text!r} ({error})", kind="file") from error
     if not faces:
         raise MeshError(f"{name}: expected at least one face, got none", kind="empty")
     points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-    corners, uv_corners = _triangles(faces, points)
+    corners, uv_corners, face_of = _triangles(faces, points)
     uv = None
     if coordinates and min(map(min, uv_corners)) >= 0:
         uv = np.array(coordinates, dtype=np.float64)[np.array(uv_corners)]
-    return RawMesh(points, np.array(corners, dtype=np.int64), uv)
+    groups = {name: np.flatnonzero(np.isin(face_of, faces_of)) for name, faces_of in members.items()}
+    return RawMesh(points, np.array(corners, dtype=np.int64), uv, groups or None)
 
 
 def _face(words: list[str], vertex_count: int, uv_count: int) -> tuple[list[int], list[int]]:
@@ -73,28 +83,47 @@ def _index(word: str, count: int, what: str) -> int:
     return index
 
 
-def _triangles(faces: list[tuple[list[int], list[int]]], points: Floats) -> tuple[list[list[int]], list[list[int]]]:
+def _triangles(
+    faces: list[tuple[list[int], list[int]]], points: Floats
+) -> tuple[list[list[int]], list[list[int]], list[int]]:
+    """Corners, UV corners and face of each triangle."""
     corners: list[list[int]] = []
     uv_corners: list[list[int]] = []
-    for face, uv in faces:
+    face_of: list[int] = []
+    for number, (face, uv) in enumerate(faces):
         for local in [(0, 1, 2)] if len(face) == 3 else triangulate(points[face]):
             corners.append([face[k] for k in local])
             uv_corners.append([uv[k] for k in local])
-    return corners, uv_corners
+            face_of.append(number)
+    return corners, uv_corners, face_of
 
 
 def dump(mesh: RawMesh) -> bytes:
-    """Text of an OBJ file; numbers read back to the same float64. Equal UV of corners are written once."""
+    """Text of an OBJ file; numbers read back to the same float64. Equal UV of corners are written once.
+
+    Groups become ``g`` lines; blanks in their names, which part names there, become ``_``.
+    """
     out = BytesIO()
     _rows(out, b"v ", mesh.vertices)
     triangles: Ints = mesh.triangles + 1
     if mesh.uv is None:
-        _rows(out, b"f ", triangles)
+        lines = [b"f %d %d %d\n" % tuple(face) for face in triangles.tolist()]
+    else:
+        coordinates, index = np.unique(mesh.uv.reshape(-1, 2), axis=0, return_inverse=True)
+        _rows(out, b"vt ", coordinates)
+        pairs = np.stack([triangles, index.reshape(-1, 3) + 1], axis=-1)
+        lines = [b"f " + b" ".join(b"%d/%d" % (v, t) for v, t in face) + b"\n" for face in pairs.tolist()]
+    if mesh.groups:
+        names: list[list[str]] = [[] for _ in lines]
+        for name, members in mesh.groups.items():
+            for triangle in members.tolist():
+                names[triangle].append("_".join(name.split()) or "_")
+        for t in range(len(lines)):
+            if t == 0 or names[t] != names[t - 1]:
+                out.write(("g " + " ".join(names[t])).rstrip().encode() + b"\n")
+            out.write(lines[t])
         return out.getvalue()
-    coordinates, index = np.unique(mesh.uv.reshape(-1, 2), axis=0, return_inverse=True)
-    _rows(out, b"vt ", coordinates)
-    pairs = np.stack([triangles, index.reshape(-1, 3) + 1], axis=-1)
-    out.writelines(b"f " + b" ".join(b"%d/%d" % (v, t) for v, t in face) + b"\n" for face in pairs.tolist())
+    out.writelines(lines)
     return out.getvalue()
 
 

@@ -16,6 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from clothsim._files import output_error, write_whole
 from clothsim.errors import CheckpointError, OutputExists
 from clothsim.scene import Scene
@@ -28,6 +30,9 @@ OUTPUTS = (
     "obj",
     "ply",
     "scene.usdc",
+    "scene.glb",
+    "pc2",
+    "vtk",
     "film_strip.png",
     "plots.png",
     "report.json",
@@ -42,8 +47,10 @@ def digest(scene: Scene) -> str:
         for name, arrays in sorted(group.items()):
             sha.update(name.encode())
             for array in arrays if isinstance(arrays, tuple) else (arrays,):
-                if array is not None:
+                if isinstance(array, np.ndarray):
                     sha.update(str(array.shape).encode() + array.tobytes())
+                elif array:  # groups, a rate
+                    sha.update(json.dumps(array, sort_keys=True).encode())
     return sha.hexdigest()
 
 

@@ -17,7 +17,9 @@ import numpy as np
 from clothsim._device import check_device
 from clothsim._run.facts import FrameFacts
 from clothsim._run.folder import RunFolder, digest
+from clothsim._run.frames import FrameWriter
 from clothsim._run.outputs import Outputs, check_packages
+from clothsim._run.start import Start
 from clothsim.errors import (
     CheckpointError,
     DeviceError,
@@ -26,7 +28,7 @@ from clothsim.errors import (
     SimulationStuck,
     SolverFailed,
 )
-from clothsim.recording import FrameWriter, Recording
+from clothsim.recording import Recording
 from clothsim.scene import Scene
 from clothsim.simulation import Simulation, frame_lengths, moving_positions, progress_bar, standing_positions
 
@@ -64,6 +66,8 @@ class Job:
         Run from a start with intersections, even if the scene does not say so.
     resume, overwrite : bool
         What to do with a run that is there already.
+    start : Start or None
+        The frame of another run to go on from; by default the scene's own start.
     progress : bool
         Show a bar.
     """
@@ -77,6 +81,7 @@ class Job:
     resume: bool = False
     overwrite: bool = False
     progress: bool = True
+    start: Start | None = None
 
     def run(self) -> dict[str, Any]:
         """Simulate and write what the scene's ``[output]`` asks for; return the report without its frames.
@@ -127,14 +132,14 @@ class Job:
             known = False
         if not known:
             raise CheckpointError(f"{self.out}: report.json is damaged or of another version; {anew}")
-        if report["scene_digest"] != digest(self.scene):
+        if report["scene_digest"] != self._digest():
             raise CheckpointError(
                 f"{self.out}: the finished run is of another scene, or the scene or one of its meshes has changed; "
                 f"{anew}"
             )
         if report["error"] is not None:
             raise CheckpointError(f"{self.out}: the run ended with an error ({report['error']}); {anew}")
-        asked = 1 + len(frame_lengths(self.scene.duration, float(self.scene.output["fps"]))[: self.frames])
+        asked = 1 + len(self._lengths())
         if report["frame_count"] < asked:
             raise CheckpointError(
                 f"{self.out}: the finished run has {report['frame_count']} of {asked} frames, "
@@ -142,11 +147,24 @@ class Job:
             )
         return {key: value for key, value in report.items() if key != "frames"}
 
+    def _digest(self) -> str:
+        """Fingerprint of what is asked for: the scene, and the frame that the run begins with."""
+        return digest(self.scene) + ("" if self.start is None else self.start.digest())
+
+    def _lengths(self) -> list[float]:
+        """Time from each frame to the next [s], to the end of the scene or as many frames as are asked for."""
+        begin = 0.0 if self.start is None else self.start.time
+        return frame_lengths(max(0.0, self.scene.duration - begin), float(self.scene.output["fps"]))[: self.frames]
+
     def _new_simulation(self) -> Simulation:
+        if self.start is not None:
+            return Simulation._from_start(
+                self.scene, self.start, self.threads, self.device, allow_intersections=self.allow_intersections
+            )
         return Simulation(self.scene, self.threads, self.device, allow_intersections=self.allow_intersections)
 
     def _run(self, folder: RunFolder, settings: dict[str, Any], simulation: Simulation | None) -> dict[str, Any]:
-        fingerprint = digest(self.scene)
+        fingerprint = self._digest()
         if not self.resume:
             folder.clear_work()
         header, simulation = self._start(folder, fingerprint, simulation)
@@ -154,11 +172,14 @@ class Job:
             for warning in simulation.plan["warnings"]:
                 print(f"warning: {warning}", file=sys.stderr)
         fps = float(settings["fps"])
-        lengths = frame_lengths(self.scene.duration, fps)[: self.frames]
+        lengths = self._lengths()
         bodies = simulation.bodies
         standing = standing_positions(bodies, simulation.collider_positions)
         every = round(float(settings["checkpoint_interval"]) * fps)
-        writer = FrameWriter(folder.work, sum(b.vertex_count for b in bodies if not b.static), keep=header["frames"])
+        moving = sum(b.vertex_count for b in bodies if not b.static)
+        with_velocities = bool(settings["velocities"])
+        cloth = sum(b.vertex_count for b in bodies if b.kind == "cloth")
+        writer = FrameWriter(folder.work, moving + cloth * with_velocities, keep=header["frames"])
         facts = FrameFacts(simulation, header)
 
         def checkpoint() -> None:
@@ -170,7 +191,11 @@ class Job:
             lines = writer.facts()
             times = np.array([line["time"] for line in lines])
             scene = self.scene.to_dict()
-            recording = Recording(bodies, times, writer.rows(), standing, fps=fps, up=scene["up"], name=scene["name"])
+            rows = writer.rows()
+            recording = Recording(
+                bodies, times, rows[:, :moving], standing,
+                velocities=rows[:, moving:] if with_velocities else None, fps=fps, up=scene["up"], name=scene["name"],
+            )  # fmt: skip
             outputs = Outputs(
                 self.out, settings, recording, lines, simulation, facts.wall_seconds(), error, fingerprint
             )
@@ -216,8 +241,10 @@ class Job:
                         raise DeviceError(kept, device=failure.device) from failure
                     # A signal during a frame's last step comes through after it: then the frame is complete.
                     if not stopped or (core.step_count > before and not core.interrupted):
-                        positions = moving_positions(bodies, simulation.positions, simulation.collider_positions)
-                        writer.append(positions, facts.next(writer.frames))
+                        rows = moving_positions(bodies, simulation.positions, simulation.collider_positions)
+                        if self.scene.output["velocities"]:
+                            rows = np.concatenate([rows, simulation.velocities])
+                        writer.append(rows, facts.next(writer.frames))
                         bar.update()
                     if stopped:
                         checkpoint()

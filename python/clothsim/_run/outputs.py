@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import json
 import platform
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from clothsim import _core
+from clothsim._export.writers import FORMATS
 from clothsim._files import output_error, write_whole
 from clothsim._run.folder import OUTPUTS
 from clothsim.errors import ClothSimError, MissingDependency, OutputError
@@ -21,7 +23,12 @@ from clothsim.simulation import Simulation
 __all__ = ["Outputs", "check_packages"]
 
 # Key of [output], module it needs, how to get it.
-_NEEDS = (("usd", "pxr", "usd"), ("film_strip", "pyvista", "view"), ("plots", "matplotlib", "plot"))
+_NEEDS = (
+    ("usd", "pxr", "usd"),
+    ("film_strip", "pyvista", "view"),
+    ("plots", "matplotlib", "plot"),
+    ("vtk", "pyvista", "view"),
+)
 
 
 def check_packages(settings: dict[str, Any]) -> None:
@@ -64,19 +71,16 @@ class Outputs:
         OutputError
             One of them could not be written; the others are there.
         """
-        jobs: dict[str, Callable[[Path], None]] = {
-            "frames.npz": self._recording.save,
-            "obj": lambda path: self._sequence(path, "obj"),
-            "ply": lambda path: self._sequence(path, "ply"),
-            "scene.usdc": self._recording.save_usd,
-            "film_strip.png": self._film_strip,
-            "plots.png": self._plots,
+        jobs: dict[str, tuple[str, Callable[[Path], None]]] = {
+            "npz": ("frames.npz", self._recording.save),
+            **{key: (form.file, functools.partial(form.write, self._recording)) for key, form in FORMATS.items()},
+            "film_strip": ("film_strip.png", self._film_strip),
+            "plots": ("plots.png", self._plots),
         }
-        keys = {"frames.npz": "npz", "scene.usdc": "usd", "film_strip.png": "film_strip", "plots.png": "plots"}
         failures: list[str] = []
         written: list[str] = []
-        for name, job in jobs.items():
-            if not self._settings[keys.get(name, name)]:
+        for key, (name, job) in jobs.items():
+            if not self._settings[key]:
                 continue
             if progress:
                 print(f"writing {name}", file=sys.stderr)
@@ -97,11 +101,6 @@ class Outputs:
         write_whole(self._out / "report.json", json.dumps(report, indent=1).encode())
         self._remove_stale([*written, "report.json"])
         return {key: value for key, value in report.items() if key != "frames"}
-
-    def _sequence(self, folder: Path, suffix: str) -> None:
-        from clothsim._export import sequence
-
-        sequence.write(self._recording, folder, suffix, overwrite=True)
 
     def _film_strip(self, path: Path) -> None:
         self._recording.film_strip(path)

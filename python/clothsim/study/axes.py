@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import difflib
 import itertools
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -17,7 +18,7 @@ from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
 from clothsim.study.resolution import set_resolution
 
-__all__ = ["NAMED", "Axis", "apply", "axis", "axis_kind", "parse", "value_text", "variant"]
+__all__ = ["NAMED", "RUN_AXES", "Axis", "apply", "axis", "axis_kind", "parse", "value_text", "variant"]
 
 # Names for keys of a scene that studies vary most.
 _KEYS = {
@@ -42,6 +43,7 @@ _OTHER = {
     "hinges": "coupled or independent, of every material's bending law",
     "threads": "threads of the run",
     "device": "device of collision detection",
+    "precision": "f64, or f32: the state is kept in single precision from step to step",
 }
 NAMED = {**_KEYS, **_OTHER}
 # Tables and keys of a scene at the top level, where a path may begin.
@@ -49,10 +51,24 @@ _ROOTS = ("time", "solver", "air", "contact", "cloth", "collider", "output", "gr
 # Smaller is finer, or larger is; these do not change what the exact answer is.
 _REFINES = {"time.dt": -1, "solver.tolerance": -1, "time.newton_tolerance": -1, "resolution": 1}
 _NUMERIC_ONLY = {
-    *_REFINES, "time.integrator", "time.indefinite", "time.bending_substeps", "time.newton_max_iterations",
-    "time.max_halvings", "solver.method", "solver.max_iterations", "contact.detector", "contact.method",
-    "contact.max_passes", "contact.max_zone_passes", "threads", "device",
-}  # fmt: skip
+    *_REFINES,
+    "time.integrator",
+    "time.indefinite",
+    "time.bending_substeps",
+    "time.newton_max_iterations",
+    "time.max_halvings",
+    "solver.method",
+    "solver.max_iterations",
+    "contact.detector",
+    "contact.method",
+    "contact.max_passes",
+    "contact.max_zone_passes",
+    "threads",
+    "device",
+    "precision",
+}
+# How a run is made: no part of a scene.
+RUN_AXES = ("threads", "device", "precision")  # fmt: skip
 _MOST_VALUES = 1000
 
 
@@ -126,6 +142,8 @@ def axis(name: str, values: Any) -> Axis:
         expected = f"1 to {_MOST_VALUES} values"
         raise InvalidInput(f"axis {name}: expected {expected}, got {len(found)}", name=name, expected=expected)
     texts = [value_text(v) for v in found]
+    if wild := [t for t, v in zip(texts, found, strict=True) if isinstance(v, float) and not math.isfinite(v)]:
+        raise InvalidInput(f"axis {name}: expected finite numbers, got {', '.join(wild)}", name=name, got=wild[0])
     twice = sorted({t for t in texts if texts.count(t) > 1})
     if twice:
         raise InvalidInput(f"axis {name}: expected each value once, got {', '.join(twice)} twice", name=name)
@@ -229,7 +247,7 @@ def apply(data: dict[str, Any], key: str, value: Any) -> None:
     InvalidInput
         The scene has nothing that it applies to.
     """
-    if key in ("threads", "device"):
+    if key in RUN_AXES:
         return
     if key == "resolution":
         set_resolution(data, value)

@@ -19,7 +19,7 @@ from clothsim import _core
 from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
 from clothsim.study import evaluate, machine, outputs
-from clothsim.study.axes import Axis, apply, axis, value_text
+from clothsim.study.axes import RUN_AXES, Axis, apply, axis, value_text
 from clothsim.study.closed_forms import ClosedForm, find
 from clothsim.study.folder import StudyFolder, fingerprint
 from clothsim.study.metrics import Metric, metrics
@@ -115,7 +115,7 @@ def based(scene: Scene, fixed: Mapping[str, Any]) -> dict[str, Any]:
     data = copy.deepcopy(scene.to_dict())
     for name, value in fixed.items():
         only = axis(name, [value])
-        if only.key in ("threads", "device"):
+        if only.key in RUN_AXES:
             raise InvalidInput(f"set: {name} is no part of a scene; vary it", name=name)
         apply(data, only.key, value)
     checked: dict[str, Any] = json.loads(_core.Scene.from_json(json.dumps(data)).to_json())

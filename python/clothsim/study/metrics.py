@@ -165,6 +165,10 @@ def _final_energy(state: State) -> float:
     return float(sum(state.energy(k)[-1] for k in kinds))
 
 
+def _kinetic(state: State) -> float:
+    return float(state.energy("kinetic")[-1])
+
+
 _ALL = (
     Metric("rms", "m", "RMS distance of vertices from the same material points of the reference", "distance", _rms),
     Metric("max", "m", "largest distance of a vertex from the same material point of the reference", "distance", _max),
@@ -177,6 +181,7 @@ _ALL = (
     Metric("drape", "-", "drape coefficient: the shadow over the flat cloth's, less the pedestal", "quantity", _drape),
     Metric("lowest", "m", "height of the lowest vertex at the end", "quantity", _lowest),
     Metric("strain_energy", "J", "energy of deformation at the end", "quantity", _final_energy),
+    Metric("kinetic_energy", "J", "energy of motion at the end", "quantity", _kinetic),
 )  # fmt: skip
 METRICS = {metric.name: metric for metric in _ALL}
 

@@ -66,14 +66,16 @@ def _along(study: Study) -> Axis | None:
 def _series(study: Study, along: Axis | None) -> list[tuple[str, str, str, list[Row]]]:
     """Lines: name, colour by the first of the other axes, mark by the second, and rows in order."""
     others = [a for a in study.axes if a is not along]
+    if along is None:  # points that no line joins go by the first axis, as far as there are colours
+        others = others[:1] if len(others[0].values) <= len(_COLOURS) else []
     groups: dict[str, list[Row]] = {}
     for row in study.rows:
-        name = label(row.settings, [a.name for a in others]) if along else "points"
+        name = label(row.settings, [a.name for a in others]) if others or along else "points"
         groups.setdefault(name, []).append(row)
     out = []
     for name, rows in groups.items():
         colour, mark = 0, 0
-        if along and others:
+        if others:
             colour = _place(others[0], rows[0])
             mark = _place(others[1], rows[0]) if len(others) > 1 else colour
         own = sorted(rows, key=lambda r: float(r.settings[along.name])) if along else rows
@@ -241,5 +243,5 @@ def _names(axis: Any, study: Study, along: Axis | None) -> None:
     handles, names = axis.figure.axes[0].get_legend_handles_labels()
     orders = {label(o.settings): o.order for o in study.orders if along and o.axis == along.name}
     names = [name + (f": order {orders[name]:.1f}" if name in orders else "") for name in names]
-    if along and len(names) > 1:
+    if len(names) > (1 if along else 2):  # the front is one, which tells nothing beside nameless points
         axis.legend(handles, names, frameon=False, fontsize=9, loc="lower left", bbox_to_anchor=(-0.02, -0.06))

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import copy
+import difflib
 import itertools
 import json
 import math
 import random
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from clothsim import _core
-from clothsim._device import check_threads
+from clothsim._device import DEVICES, GPU_METHODS, check_threads
 from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.study.axes import Axis, apply, value_text
 
@@ -23,6 +24,7 @@ Settings = dict[str, Any]
 _MOST_POINTS = 20_000
 # A material's fabric comes before its law, both before single keys.
 _FIRST = ("resolution", "fabric", "bending", "hinges")
+_PRECISIONS = ("f64", "f32")
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,9 @@ class Built:
     """Tables of a point's scene and how to run it, or why it cannot be."""
 
     data: dict[str, Any]
-    threads: int
-    device: str
+    threads: int = 1
+    device: str = "cpu"
+    precision: str = "f64"
     error: str | None = None
 
 
@@ -93,7 +96,7 @@ def _sampled(axes: Sequence[Axis], count: int, sample: int, seed: int) -> list[S
 
 def build(base: Mapping[str, Any], axes: Sequence[Axis], settings: Settings) -> Built:
     """Make the scene of a point; what cannot be built says why."""
-    data, threads, device = copy.deepcopy(dict(base)), 1, "cpu"
+    data, run = copy.deepcopy(dict(base)), Built({})
     order = {name: k for k, name in enumerate(_FIRST)}
     try:
         for axis in sorted(axes, key=lambda a: order.get(a.key, len(order))):
@@ -101,15 +104,31 @@ def build(base: Mapping[str, Any], axes: Sequence[Axis], settings: Settings) -> 
                 continue
             value = settings[axis.name]
             if axis.key == "threads":
-                threads = check_threads(value) or 1
+                run = replace(run, threads=check_threads(value) or 1)
             elif axis.key == "device":
-                device = value
+                run = replace(run, device=_one_of("device", value, DEVICES))
+            elif axis.key == "precision":
+                run = replace(run, precision=_one_of("precision", value, _PRECISIONS))
             else:
                 apply(data, axis.key, value)
         checked = json.loads(_core.Scene.from_json(json.dumps(data)).to_json())
     except ClothSimError as error:
-        return Built(data, threads, device, str(error))
-    return Built(checked, threads, device)
+        return replace(run, data=data, error=str(error))
+    detector = (checked.get("contact") or {}).get("detector")
+    if detector in GPU_METHODS and all(axis.key != "device" for axis in axes):
+        run = replace(run, device="gpu")
+    return replace(run, data=checked)
+
+
+def _one_of(name: str, value: Any, known: Sequence[str]) -> str:
+    if value not in known:
+        close = difflib.get_close_matches(str(value), known, n=1, cutoff=0.5)
+        hint = f' (did you mean "{close[0]}"?)' if close else ""
+        expected = f"one of {', '.join(known)}"
+        raise InvalidInput(
+            f'{name}: expected {expected}, got "{value_text(value)}"{hint}', name=name, expected=expected
+        )
+    return str(value)
 
 
 def check_values(base: Mapping[str, Any], axes: Sequence[Axis], points: Sequence[Settings]) -> None:

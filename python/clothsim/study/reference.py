@@ -155,7 +155,9 @@ def _integrators(axes: Sequence[Axis]) -> list[Any]:
 
 
 def _usual(runner: Runner, a: Axis) -> Any:
-    """The scene's own value of an axis if it is varied over, else the first."""
+    """The scene's own value of an axis if it is varied over, else the first; the better precision."""
+    if a.key == "precision":
+        return max(a.values)
     at: Any = runner.base
     for step in a.key.split("."):
         at = at.get(step) if isinstance(at, dict) else None

@@ -107,7 +107,7 @@ class Runner:
     def _job(self, built: Built, seed: int | None, *, timed: bool) -> Job:
         spec = {
             "data": built.data, "threads": built.threads, "device": built.device, "seed": seed,
-            "disturbance": self._disturbance if seed is not None else 0.0,
+            "disturbance": self._disturbance if seed is not None else 0.0, "precision": built.precision,
         }  # fmt: skip
         name = fingerprint([self._digest, spec])
         more = {"scene": str(self._scene), "repeats": self._repeats if timed else 0, "patience": self._patience}

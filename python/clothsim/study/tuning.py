@@ -14,7 +14,7 @@ from clothsim._files import write_whole
 from clothsim.errors import InvalidInput, OutputExists
 from clothsim.scene import Scene
 from clothsim.study import evaluate, machine, outputs
-from clothsim.study.axes import Axis, apply, axis, variant
+from clothsim.study.axes import RUN_AXES, Axis, apply, axis, variant
 from clothsim.study.folder import StudyFolder, fingerprint
 from clothsim.study.job import Request, based, study_folder
 from clothsim.study.points import label
@@ -164,6 +164,9 @@ def _write(found: Tuned, out: Path) -> list[Path]:
 
 def _axes(base: dict[str, Any], vary: Sequence[Axis]) -> list[Axis]:
     for a in vary:
+        if a.key in RUN_AXES:
+            expected = "axes of the scene that is written, such as integrator or dt"
+            raise InvalidInput(f"vary: expected {expected}, got {a.name}, which is no part of one", name="vary")
         if not a.numerical:
             raise InvalidInput(
                 f"tune: expected axes that do not change what is asked, such as integrator, dt, resolution or "

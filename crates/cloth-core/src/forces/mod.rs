@@ -15,6 +15,7 @@ pub(crate) mod air;
 pub(crate) mod coupled;
 pub(crate) mod hinge;
 pub(crate) mod spring;
+pub(crate) mod stitch;
 pub(crate) mod stretch_shear;
 
 #[cfg(test)]
@@ -177,6 +178,9 @@ pub(crate) trait ForceModel: Send + Sync {
     /// Adds to `out` what the exact −K_x of a coupled model makes of the corner motions `d` beyond its `couplings` of a
     /// single step.
     fn add_beyond(&self, _couplings: &[Outer], _d: &[Vec3], _out: &mut [Vec3]) {}
+
+    /// Says at which time [s] forces and energy are asked for, for laws that change with it.
+    fn set_time(&mut self, _time: f64) {}
 
     /// Whether it resists bending.
     fn bends(&self) -> bool {

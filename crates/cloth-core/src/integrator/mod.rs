@@ -180,6 +180,11 @@ impl Integrator {
         &self.system
     }
 
+    /// Says at which time \[s\] forces and energy are asked for from here on: seams close over time.
+    pub fn set_time(&mut self, time: f64) {
+        self.system.set_time(time);
+    }
+
     /// The parameters it steps with.
     pub fn params(&self) -> &IntegratorParams {
         &self.params

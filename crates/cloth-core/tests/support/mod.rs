@@ -23,7 +23,8 @@ pub(crate) fn sheet(size: f64, n: usize) -> TriMesh {
 pub(crate) fn system(mesh: &TriMesh, material: &Material, env: &Environment) -> ClothSystem {
     let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
     let rest = RestShape::new(mesh, Vec3::x()).unwrap();
-    let part = ClothPart { mesh, topology: &topology, rest: &rest, material, first_vertex: 0 };
+    let part =
+        ClothPart { mesh, topology: &topology, rest: &rest, material, first_vertex: 0, triangles: None };
     ClothSystem::new(&[part], env, mesh.vertices.len()).unwrap()
 }
 

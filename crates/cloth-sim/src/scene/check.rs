@@ -1,8 +1,7 @@
 //! Value ranges and what belongs together, as far as the scene alone can tell.
 
-use super::{Cloth, Collider, ContactMethod, Keyframe, MaterialChoice, Pin, Rotation, Scene, SceneError};
+use super::{Cloth, Collider, ContactMethod, Keyframe, Pin, Rotation, Scene, SceneError};
 use crate::device::method_names;
-use cloth_core::{CoreError, material::library};
 
 impl Scene {
     /// Refuses values out of range, names that are not known or not unique, and keys that exclude each other.
@@ -91,7 +90,8 @@ impl Scene {
     }
 
     fn check_cloth(&self, cloth: &Cloth, key: &str) -> Result<(), SceneError> {
-        self.resolve_material(cloth, key)?;
+        self.resolve_material(&cloth.material, &format!("{key}.material"))?;
+        self.check_garment(cloth, key)?;
         self.finite(&format!("{key}.warp"), &cloth.warp, "")?;
         if cloth.warp == [0.0; 3] {
             return Err(self.error(
@@ -109,48 +109,11 @@ impl Scene {
         Ok(())
     }
 
-    /// The parameters of a cloth's material, checked.
-    pub(crate) fn resolve_material(
-        &self,
-        cloth: &Cloth,
-        key: &str,
-    ) -> Result<cloth_core::Material, SceneError> {
-        let key = format!("{key}.material");
-        let (name_key, result) = match &cloth.material {
-            MaterialChoice::Named(name) => (key.clone(), library::named(name)),
-            MaterialChoice::Fabric(choice) => (format!("{key}.fabric"), choice.material()),
-            MaterialChoice::Given(material) => (key.clone(), material.check().map(|()| *material)),
-        };
-        result.map_err(|error| match error {
-            CoreError::UnknownMaterial { got, known } => self
-                .error(&name_key, format!("one of {known:?}"), format!("\"{got}\""))
-                .with_nearest(&got, known.into_iter()),
-            CoreError::Parameter { name, expected, got } => {
-                let name = match &cloth.material {
-                    MaterialChoice::Fabric(_) => name.trim_start_matches("bending."),
-                    _ => name,
-                };
-                self.error(&format!("{key}.{name}"), expected, format!("{got}"))
-            }
-            CoreError::Missing { name, expected } => {
-                self.error(&format!("{key}.{name}"), expected, "nothing")
-            }
-            other => self.error(&key, "a material", other.to_string()),
-        })
-    }
-
     fn check_pin(&self, pin: &Pin, key: &str) -> Result<(), SceneError> {
         match (&pin.vertices, &pin.region) {
             (Some(_), Some(_)) => return Err(self.error(key, "either vertices or box", "both")),
             (None, None) => return Err(self.error(key, "vertices or box", "neither")),
-            (None, Some(region)) => {
-                self.finite(&format!("{key}.box.min"), &region.min, "m")?;
-                self.finite(&format!("{key}.box.max"), &region.max, "m")?;
-                if (0..3).any(|a| region.min[a] > region.max[a]) {
-                    let got = format!("{:?} and {:?}", region.min, region.max);
-                    return Err(self.error(&format!("{key}.box"), "min ≤ max along each axis", got));
-                }
-            }
+            (None, Some(region)) => self.check_box(region, &format!("{key}.box"))?,
             (Some(vertices), None) if vertices.is_empty() => {
                 return Err(self.error(&format!("{key}.vertices"), "at least one vertex", "none"));
             }
@@ -190,7 +153,22 @@ impl Scene {
                 let got = if sequence.file.is_some() { "both" } else { "neither" };
                 return Err(self.error(&key, "exactly one of file, asset", got));
             }
-            self.positive(&format!("{key}.fps"), sequence.fps, "1/s")?;
+            if let Some(fps) = sequence.fps {
+                self.positive(&format!("{key}.fps"), fps, "1/s")?;
+            }
+            if let Some(scale) = sequence.scale {
+                self.positive(&format!("{key}.scale"), scale, "m")?;
+            }
+            let of_files = [
+                ("scale", sequence.scale.is_some()),
+                ("up", sequence.up.is_some()),
+                ("animation", sequence.animation.is_some()),
+                ("part", sequence.part.is_some()),
+            ];
+            if let Some((name, _)) = of_files.into_iter().find(|(_, given)| *given && sequence.file.is_none())
+            {
+                return Err(self.error(&format!("{key}.{name}"), "nothing without a file", "a value"));
+            }
             self.finite(&format!("{key}.start"), &[sequence.start], "s")?;
             if !collider.keyframes.is_empty() {
                 return Err(self.error(&format!("{key}.keyframes"), "none beside a sequence", "some"));
@@ -231,21 +209,21 @@ impl Scene {
         Ok(())
     }
 
-    fn finite(&self, key: &str, values: &[f64], unit: &str) -> Result<(), SceneError> {
+    pub(super) fn finite(&self, key: &str, values: &[f64], unit: &str) -> Result<(), SceneError> {
         match values.iter().find(|x| !x.is_finite()) {
             Some(x) => Err(self.error(key, with_unit("finite numbers", unit), format!("{x}"))),
             None => Ok(()),
         }
     }
 
-    fn positive(&self, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
+    pub(super) fn positive(&self, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
         if value.is_finite() && value > 0.0 {
             return Ok(());
         }
         Err(self.error(key, with_unit("a finite number > 0", unit), format!("{value}")))
     }
 
-    fn not_negative(&self, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
+    pub(super) fn not_negative(&self, key: &str, value: f64, unit: &str) -> Result<(), SceneError> {
         if value.is_finite() && value >= 0.0 {
             return Ok(());
         }

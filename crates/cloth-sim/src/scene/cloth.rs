@@ -1,6 +1,6 @@
 //! A piece of cloth: mesh, material, start, pins.
 
-use super::{Friction, Keyframe, Rotation, StrainLimitSource};
+use super::{Friction, Keyframe, Region, Rotation, Seam, StrainLimitSource};
 use cloth_core::{Bending, CoreError, HingeCoupling, Material, material::library};
 use serde::{Deserialize, Serialize};
 
@@ -49,6 +49,12 @@ pub struct Cloth {
     /// Vertices whose motion is prescribed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pins: Vec<Pin>,
+    /// Triangles with a material of their own; where two regions have the same triangle, the later one counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<Region>,
+    /// Vertices that are sewn to each other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub seams: Vec<Seam>,
 }
 
 fn x_axis() -> [f64; 3] {

@@ -1,8 +1,9 @@
 //! A body that moves as prescribed.
 
-use super::{Friction, Keyframe, MeshSource, Rotation};
+use super::{Friction, Keyframe, MeshSource, Rotation, Up};
 use cloth_collision::shapes::Shape;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// A body that moves as prescribed and that cloth meets. Exactly one of `shape`, `mesh` and `sequence`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -104,15 +105,52 @@ impl ShapeSource {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SequenceSource {
-    /// Path of a file with the frames, relative to the scene file.
+    /// Path of the frames, relative to the scene file: a NumPy archive (.npz), a folder or a pattern (`walk/*.obj`) of OBJ, PLY or STL
+    /// files, glTF with skin or morph targets, or USD.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
     /// Name of an asset with the frames.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asset: Option<String>,
-    /// Frames per second, > 0.
-    pub fps: f64,
+    /// Frames per second, > 0. Files of glTF and USD are sampled so often; by default 60 times, or once per time code.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fps: Option<f64>,
     /// Time of the first frame [s]; before it and after the last the mesh stands still.
     #[serde(default)]
     pub start: f64,
+    /// Metres per unit of the file, > 0, on top of the unit that the file says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f64>,
+    /// The axis that points up in the file; by default what the file says, else that of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub up: Option<Up>,
+    /// Name of the animation in a glTF file; by default the only one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub animation: Option<String>,
+    /// Name of a glTF node or path of a USD prim: only the meshes at and below it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<String>,
+}
+
+impl SequenceSource {
+    /// Name under which its frames are expected among the assets: that of the asset, or the file's path with what is asked of
+    /// the file, so that one file may serve several colliders.
+    pub fn asset_name(&self) -> String {
+        let Some(file) = &self.file else { return self.asset.clone().unwrap_or_default() };
+        let up = self.up.map(|up| if up == Up::Z { "z" } else { "y" }.to_owned());
+        // The frames of an archive are the same at any rate.
+        let is_archive = Path::new(file).extension().is_some_and(|suffix| suffix.eq_ignore_ascii_case("npz"));
+        let fps = self.fps.filter(|_| !is_archive).map(|fps| fps.to_string());
+        let asked = [
+            ("fps", fps),
+            ("scale", self.scale.map(|scale| scale.to_string())),
+            ("up", up),
+            ("animation", self.animation.clone()),
+            ("part", self.part.clone()),
+        ];
+        asked.into_iter().fold(file.clone(), |name, (key, value)| match value {
+            Some(value) => format!("{name}#{key}={value}"),
+            None => name,
+        })
+    }
 }

@@ -8,8 +8,10 @@ use std::sync::{Arc, LazyLock};
 /// Files that a scene names, for whoever loads them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileReference {
-    /// Path as written in the scene: also the key under which the asset is expected.
+    /// Path as written in the scene.
     pub path: String,
+    /// Name under which the asset is expected: the path, for an animated mesh with what is asked of the file.
+    pub asset: String,
     /// Whether frames of an animated mesh are expected, rather than one mesh.
     pub sequence: bool,
     /// Key in the scene, such as `cloth[0].mesh.file`.
@@ -88,7 +90,8 @@ impl Scene {
         let mut files = Vec::new();
         let mut mesh = |source: &MeshSource, key: String| {
             if let MeshSource::File(file) = source {
-                files.push(FileReference { path: file.file.clone(), sequence: false, key: key + ".file" });
+                let (path, asset) = (file.file.clone(), file.file.clone());
+                files.push(FileReference { path, asset, sequence: false, key: key + ".file" });
             }
         };
         for (i, cloth) in self.cloth.iter().enumerate() {
@@ -100,9 +103,11 @@ impl Scene {
             }
         }
         for (i, collider) in self.collider.iter().enumerate() {
-            if let Some(path) = collider.sequence.as_ref().and_then(|s| s.file.clone()) {
+            let Some(source) = &collider.sequence else { continue };
+            if let Some(path) = source.file.clone() {
                 files.push(FileReference {
                     path,
+                    asset: source.asset_name(),
                     sequence: true,
                     key: format!("collider[{i}].sequence.file"),
                 });

@@ -4,10 +4,12 @@
 
 mod bounds;
 mod check;
+mod check_garment;
 mod cloth;
 mod collider;
 mod file;
 mod friction;
+mod garment;
 mod motion;
 mod output;
 mod schema;
@@ -21,6 +23,7 @@ pub use cloth::{
 pub use collider::{Collider, SequenceSource, ShapeSource};
 pub use file::FileReference;
 pub use friction::{Friction, PairFriction, StrainLimitSource, StrainLimitTable};
+pub use garment::{Region, Seam};
 pub use motion::{Keyframe, Rotation};
 pub use output::Output;
 pub use source::{SceneError, nearest};

@@ -17,6 +17,14 @@ pub struct Output {
     pub ply: bool,
     /// Time-sampled USD.
     pub usd: bool,
+    /// Binary glTF whose morph targets are the frames.
+    pub gltf: bool,
+    /// A mesh and a point cache (PC2) per body.
+    pub pc2: bool,
+    /// VTK files with a ParaView collection.
+    pub vtk: bool,
+    /// Velocities of the cloth beside the positions in the NumPy archive: a run can then go on from any frame as it went.
+    pub velocities: bool,
     /// A picture of several frames side by side.
     pub film_strip: bool,
     /// Energies and timings over time.
@@ -33,6 +41,10 @@ impl Default for Output {
             obj: false,
             ply: false,
             usd: true,
+            gltf: false,
+            pc2: false,
+            vtk: false,
+            velocities: false,
             film_strip: true,
             plots: true,
             checkpoint_interval: 0.5,

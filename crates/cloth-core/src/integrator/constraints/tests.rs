@@ -33,7 +33,14 @@ fn integrator(mesh: &TriMesh, method: Method, solver: SolverMethod) -> Integrato
     };
     let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
     let rest = RestShape::new(mesh, Vec3::x()).unwrap();
-    let part = ClothPart { mesh, topology: &topology, rest: &rest, material: &material, first_vertex: 0 };
+    let part = ClothPart {
+        mesh,
+        topology: &topology,
+        rest: &rest,
+        material: &material,
+        first_vertex: 0,
+        triangles: None,
+    };
     let system = ClothSystem::new(&[part], &Environment::default(), mesh.vertices.len()).unwrap();
     let mut params = IntegratorParams { method, newton_tolerance: 1e-11, ..IntegratorParams::default() };
     params.solver.method = solver;

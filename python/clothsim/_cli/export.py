@@ -1,0 +1,62 @@
+"""``clothsim export``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from clothsim._export.writers import FORMATS, write
+from clothsim.errors import InvalidInput
+from clothsim.recording import Recording
+
+__all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
+
+NAME = "export"
+HELP = "Write the frames of a finished run in other formats: USD, glTF, PC2, VTK, OBJ or PLY sequences."
+EXAMPLE = "clothsim export out/drape --format gltf --format vtk"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The run, the formats, and where to write."""
+    parser.add_argument("run", metavar="OUT", type=Path, help="folder of a run (or its frames.npz)")
+    parser.add_argument(
+        "-f", "--format", dest="formats", metavar="FORMAT", required=True, action="append", choices=sorted(FORMATS),
+        help=f"one of {', '.join(sorted(FORMATS))}; may be given several times",
+    )  # fmt: skip
+    parser.add_argument("--to", metavar="FOLDER", type=Path, help="where to write (default: OUT)")
+    parser.add_argument("--overwrite", action="store_true", help="replace files of the same name")
+    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Write each format, and say where."""
+    recording = read_run(options.run)
+    folder = options.to or (options.run if options.run.is_dir() else options.run.parent)
+    folder.mkdir(parents=True, exist_ok=True)
+    written: list[Path] = []
+    for name in dict.fromkeys(options.formats):
+        if not (options.quiet or options.json):
+            print(f"writing {FORMATS[name].file}", file=sys.stderr)
+        written.append(write(recording, folder, name, overwrite=options.overwrite))
+    if options.json:
+        print(json.dumps({"frames": len(recording), "written": [str(path) for path in written]}))
+    else:
+        print("\n".join(str(path) for path in written))
+    return 0
+
+
+def read_run(run: Path) -> Recording:
+    """Frames of a run, by its folder or by its frames.npz.
+
+    Raises
+    ------
+    InvalidInput
+        There are no frames, or they cannot be read.
+    """
+    path = run / "frames.npz" if run.is_dir() else run
+    if not path.exists():
+        reason = "the run is not finished, or output.npz = false" if run.is_dir() else "no such file"
+        raise InvalidInput(f"{path}: expected the frames of a run, got nothing ({reason})", name="OUT")
+    return Recording.load(path)
