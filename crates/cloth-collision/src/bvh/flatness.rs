@@ -7,7 +7,7 @@ use super::refit::Boxes;
 use crate::bounds::middle;
 use crate::session::contour::{Contours, is_simple};
 use crate::session::distance::Row;
-use crate::session::flat::{Balls, Found, mark};
+use crate::session::flat::{Found, Whereabouts, mark};
 use crate::{CollisionMesh, Vec3};
 
 /// Relative error of a coordinate in single precision, of a difference in double precision, and of the radius itself; in all less
@@ -54,11 +54,11 @@ impl Flatness {
             radii.push((size * ROUNDING) as f32 + f32::MIN_POSITIVE);
         }
         let contours = contours.get_or_insert_with(|| Contours::new(tree, mesh));
-        let balls = Balls { middles, radii, thickness };
+        let within = Whereabouts { middles, radii, thickness };
         let simple = |loops: &[Vec<u32>], axis: &Vec3, at: &(dyn Fn(u32) -> Vec3 + Sync), clearance: f64| {
             is_simple(loops, axis, at, clearance)
         };
-        *found = mark(boxes, tree, mesh, &balls, contours, simple, pool);
+        *found = mark(boxes, tree, mesh, &within, contours, simple, pool);
     }
 
     /// Memory \[B\].

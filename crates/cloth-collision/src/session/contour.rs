@@ -17,6 +17,11 @@ impl Contours {
         // Directed sides that the sides of other triangles of the block do not cancel.
         let mut open: Vec<Vec<[u32; 2]>> = Vec::with_capacity(tree.block_count());
         for ids in &tree.triangle_ids {
+            let body = mesh.vertex_body[mesh.triangles[ids[0] as usize][0] as usize];
+            if !mesh.bodies_meet(body, body) {
+                open.push(vec![]);
+                continue;
+            }
             let triangles = ids.iter().filter(|&&t| t != NONE).map(|&t| mesh.triangles[t as usize]);
             open.push(uncancelled(triangles.flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).collect()));
         }

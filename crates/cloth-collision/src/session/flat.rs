@@ -13,6 +13,7 @@
 
 use super::contour::Contours;
 use super::distance::Row;
+use crate::bounds::LANES;
 use crate::bvh::build::Tree;
 use crate::bvh::refit::Boxes;
 use crate::{CollisionMesh, Vec3};
@@ -63,7 +64,7 @@ impl Cone {
 
 /// Where the vertices are: each within its ball.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Balls<'a> {
+pub(crate) struct Whereabouts<'a> {
     /// Middles relative to some origin [m].
     pub(crate) middles: &'a [Row],
     /// Radii [m].
@@ -76,22 +77,22 @@ fn point(row: &Row) -> Vec3 {
     Vec3::new(f64::from(row[0]), f64::from(row[1]), f64::from(row[2]))
 }
 
-fn leaf_cone(ids: &[u32], mesh: &CollisionMesh, balls: &Balls<'_>) -> Option<Cone> {
-    let (mut normals, mut count) = ([Vec3::zeros(); crate::bounds::LANES], 0);
+fn leaf_cone(ids: &[u32], mesh: &CollisionMesh, within: &Whereabouts<'_>) -> Option<Cone> {
+    let (mut normals, mut count) = ([Vec3::zeros(); LANES], 0);
     let (mut squared_height, mut radius) = (f64::INFINITY, 0.0f32);
     for &t in ids.iter().filter(|&&t| t != NONE) {
         let corners = mesh.triangles[t as usize];
-        let [a, b, c] = corners.map(|v| point(&balls.middles[v as usize]));
+        let [a, b, c] = corners.map(|v| point(&within.middles[v as usize]));
         let n = (b - a).cross(&(c - a));
         let squared_area = n.norm_squared();
         let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
         for v in corners {
-            radius = radius.max(balls.radii[v as usize]);
+            radius = radius.max(within.radii[v as usize]);
         }
         squared_height = squared_height.min(squared_area / longest);
         normals[count] = n / squared_area.sqrt();
         count += 1;
-        let needed = 2.0 * f64::from(radius) + balls.thickness;
+        let needed = 2.0 * f64::from(radius) + within.thickness;
         // Not a number where the triangle is a point.
         if !(squared_height > needed * needed) {
             return None;
@@ -116,22 +117,24 @@ pub(crate) fn mark(
     boxes: &mut Boxes<1>,
     tree: &Tree,
     mesh: &CollisionMesh,
-    balls: &Balls<'_>,
+    within: &Whereabouts<'_>,
     contours: &Contours,
     is_simple: impl Fn(&[Vec<u32>], &Vec3, &(dyn Fn(u32) -> Vec3 + Sync), f64) -> bool + Sync,
     pool: &rayon::ThreadPool,
 ) -> Found {
     let leaves = tree.triangle_ids.par_iter().with_min_len(CHUNK);
-    let mut cones: Vec<Option<Cone>> =
-        pool.install(|| leaves.map(|ids| leaf_cone(ids, mesh, balls)).collect());
+    let meets_itself = |body: u32| mesh.bodies_meet(body, body);
+    let body_of = |ids: &[u32]| mesh.vertex_body[mesh.triangles[ids[0] as usize][0] as usize];
+    let cone =
+        |ids: &[u32; LANES]| meets_itself(body_of(ids)).then(|| leaf_cone(ids, mesh, within)).flatten();
+    let mut cones: Vec<Option<Cone>> = pool.install(|| leaves.map(cone).collect());
     for inner in &tree.inner {
         let children = &cones[inner.first as usize..(inner.first + inner.count) as usize];
-        cones.push(merged(children, balls.thickness));
+        cones.push(merged(children, within.thickness));
     }
     // Level by level from above: all of a level at once.
-    let position = |v: u32| point(&balls.middles[v as usize]);
+    let position = |v: u32| point(&within.middles[v as usize]);
     let mut found = Found::default();
-    let meets_itself = |body: u32| mesh.bodies_meet(body, body);
     let mut level: Vec<u32> = tree.roots.iter().filter(|r| meets_itself(r.body)).map(|r| r.block).collect();
     loop {
         level.retain(|&block| tree.inner(block).is_some());
@@ -141,7 +144,7 @@ pub(crate) fn mark(
         let is_flat = |&block: &u32| {
             let loops = contours.of_inner(block as usize - tree.leaves.len());
             cones[block as usize].as_ref().is_some_and(|cone| {
-                !loops.is_empty() && is_simple(loops, &cone.axis, &position, cone.clearance(balls.thickness))
+                !loops.is_empty() && is_simple(loops, &cone.axis, &position, cone.clearance(within.thickness))
             })
         };
         let flat: Vec<bool> = pool.install(|| level.par_iter().map(is_flat).collect());
@@ -226,7 +229,9 @@ mod tests {
         let pool = pool();
         let query = Query { x_t0: x, x_t1: x, thickness: 0.0, mode: Mode::Continuous, active: None };
         let tree = Bvh::new(&mesh, x).unwrap().tree;
-        let room = Room::new(&mesh, &query, Weights { alpha: 0.0, beta: 0.0, gamma: 0.0 }, &pool).unwrap();
+        let samples = super::super::samples::Samples::new(&mesh);
+        let room =
+            Room::new(&mesh, &samples, &query, Weights { alpha: 0.0, beta: 0.0, gamma: 0.0 }, &pool).unwrap();
         let contours = Contours::new(&tree, &mesh);
         let marked = |tested: bool| {
             let mut boxes = Boxes::<1>::default();
@@ -236,7 +241,7 @@ mod tests {
                 |loops: &[Vec<u32>], axis: &Vec3, at: &(dyn Fn(u32) -> Vec3 + Sync), clear: f64| {
                     !tested || contour::is_simple(loops, axis, at, clear)
                 };
-            mark(&mut boxes, &tree, &mesh, &room.balls(), &contours, is_simple, &pool)
+            mark(&mut boxes, &tree, &mesh, &room.whereabouts(), &contours, is_simple, &pool)
         };
         let contacts = BruteForce.detect(&mesh, &query, &pool).unwrap();
         (marked(true), marked(false), contacts.vertex_triangle.len() + contacts.edge_edge.len())
