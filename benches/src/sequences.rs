@@ -25,7 +25,12 @@ pub struct Sequence {
 impl Sequence {
     /// Positions [m] after so many frames.
     pub fn at(&self, frame: u32) -> Vec<Vec3> {
-        (self.position)(f64::from(frame) * DT)
+        self.at_time(f64::from(frame) * DT)
+    }
+
+    /// Positions [m] at a time [s].
+    pub fn at_time(&self, time: f64) -> Vec<Vec3> {
+        (self.position)(time)
     }
 }
 

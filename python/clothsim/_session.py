@@ -80,7 +80,7 @@ class SkippingSession:
         alpha: float | None = None,
         beta: float = 0.2,
         gamma: float = 0.1,
-        first_frames: int = 4,
+        first_frames: int = 8,
         most_frames: int = 64,
         adapt: Literal["work", "time"] | str = "work",
         low_curvature: bool = True,

@@ -47,7 +47,7 @@ class Scene:
     start : {"as-given", "untangle"}
         What is done about a start state whose surfaces pass through each other: it is refused, or small penetrations
         are repaired and listed in the report.
-    time, solver, air, contact, output : mapping, optional
+    time, solver, air, contact, effects, output : mapping, optional
         Tables of a scene file. Without ``contact`` nothing touches anything. `set_friction` adds friction of two
         bodies, once they are there.
     cloth, collider : sequence of mappings
@@ -79,6 +79,7 @@ class Scene:
         solver: Mapping[str, Any] | None = None,
         air: Mapping[str, Any] | None = None,
         contact: Mapping[str, Any] | None = None,
+        effects: Mapping[str, Any] | None = None,
         cloth: Sequence[Mapping[str, Any]] = (),
         collider: Sequence[Mapping[str, Any]] = (),
         output: Mapping[str, Any] | None = None,
@@ -91,8 +92,8 @@ class Scene:
         self.folder: Path | None = None
         tables = {
             "name": name, "up": up, "gravity": None if gravity is None else np.asarray(gravity), "duration": duration,
-            "start": start,
-            "time": time, "solver": solver, "air": air, "contact": contact, "output": output,
+            "start": start, "time": time, "solver": solver, "air": air, "contact": contact, "effects": effects,
+            "output": output,
         }  # fmt: skip
         self._data: dict[str, Any] = plain(tables, "")
         for key, tables_of in (("cloth", cloth), ("collider", collider)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -154,3 +155,17 @@ def test_a_simulation_with_sessions_takes_the_same_steps() -> None:
         return simulation.positions
 
     np.testing.assert_array_equal(run("session"), run("bvh"))
+
+
+def test_a_simulation_resumed_inside_a_session_takes_the_same_steps(tmp_path: Path) -> None:
+    scene = cs.Scene(duration=0.1, contact={"thickness": 0.005, "detector": "session"})
+    scene.add_cloth(cs.Mesh.grid(0.6, 0.6, 15, 15), "cotton", position=(0.0, 0.26, 0.0))
+    scene.add_collider("ball", shape={"type": "sphere", "radius": 0.25, "tolerance": 0.01})
+    whole = cs.Simulation(scene, device="cpu", threads=1)
+    whole.advance(0.05)
+    whole.save_checkpoint(tmp_path / "half")
+    resumed = cs.Simulation.resume(tmp_path / "half", device="cpu", threads=2)
+    for simulation in (whole, resumed):
+        simulation.advance(0.05)
+    assert whole.time == resumed.time == pytest.approx(0.1)
+    np.testing.assert_array_equal(whole.positions, resumed.positions)

@@ -1,7 +1,8 @@
 //! Detection over coherent sequences by every variant of the session, frame by frame in turn: seconds per stage and counts.
 //!
 //! `cargo run --release -p cloth-collision --example session -- [vertices per side] [frames] [thickness in mm] [threads]
-//! [variant]`; with a variant alone, a profiler counts what that one does.
+//! [variant]`; with a variant alone, a profiler counts what that one does. `... -- sizes [threads]`: the spinning ball from 10,000
+//! to a million triangles, time between frames and thickness in proportion to the edges, and the exponent of the cost.
 
 #![allow(clippy::unwrap_used, reason = "a measurement that cannot start has nothing to report")]
 #![allow(clippy::print_stdout, reason = "the table is its result")]
@@ -130,7 +131,63 @@ fn measure(name: &str, sequence: &Sequence, frames: u32, thickness: f64, threads
     }
 }
 
+/// Vertices along a side: about 10,000, 31,600, 100,000, 316,000 and a million triangles.
+const SIDES: [usize; 5] = [71, 127, 224, 399, 708];
+const FRAMES: u32 = 24;
+
+fn sizes(threads: usize) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    println!("spinning ball, SwD, {FRAMES} frames, {threads} threads, means per frame");
+    println!("{:>10} {:>9} {:>14} {:>9} {:>10}", "triangles", "ms", "ns / triangle", "work", "colliding");
+    let mut points = vec![];
+    for n in SIDES {
+        let sequence = spinning_ball(n).unwrap();
+        let (mesh, rest) = (&sequence.mesh, &sequence.rest);
+        let fine = 221.0 / n as f64;
+        let at = |frame: u32| sequence.at_time(f64::from(frame) * sequences::DT * fine);
+        let mut session = SkippingSession::new(mesh, rest, SessionOptions::default()).unwrap();
+        let mut sum = Sum::default();
+        let mut x_t0 = at(0);
+        for frame in 0..FRAMES {
+            let x_t1 = at(frame + 1);
+            let (thickness, mode) = (1e-3 * fine, Mode::Continuous);
+            let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
+            let start = Instant::now();
+            session.detect(mesh, &query, &pool).unwrap();
+            sum.add(start.elapsed().as_secs_f64(), session.stats());
+            x_t0 = x_t1;
+        }
+        let (triangles, frames) = (mesh.triangles.len() as f64, f64::from(FRAMES));
+        let seconds = sum.seconds / frames;
+        let (work, colliding) = (sum.work as f64 / frames, sum.colliding as f64 / frames);
+        let per_triangle = 1e9 * seconds / triangles;
+        println!(
+            "{triangles:>10} {:>9.2} {per_triangle:>14.1} {:>9.1} {colliding:>10.0}",
+            1e3 * seconds,
+            1e-6 * work
+        );
+        points.push([triangles.ln(), seconds.ln(), work.ln()]);
+    }
+    println!("exponent by least squares: time {:.3}, work {:.3}", slope(&points, 1), slope(&points, 2));
+}
+
+/// Of a straight line through the points of column `k` over the first.
+fn slope(points: &[[f64; 3]], k: usize) -> f64 {
+    let mean = |k: usize| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64;
+    let (x, y) = (mean(0), mean(k));
+    let (mut above, mut below) = (0.0, 0.0);
+    for p in points {
+        above += (p[0] - x) * (p[k] - y);
+        below += (p[0] - x) * (p[0] - x);
+    }
+    above / below
+}
+
 fn main() {
+    if std::env::args().nth(1).as_deref() == Some("sizes") {
+        sizes(std::env::args().nth(2).map_or(1, |text| text.parse().unwrap()));
+        return;
+    }
     let number =
         |k: usize, default: f64| std::env::args().nth(k).map_or(default, |text| text.parse().unwrap());
     let (n, frames) = (number(1, 221.0) as usize, number(2, 60.0) as u32);

@@ -223,3 +223,49 @@ fn bad_input_is_named() {
     ));
     assert!(matches!(bvh.proximity(&mesh, &x[..1], 0.1, None, &pool(1)), Err(DetectError::Length { .. })));
 }
+
+/// A sheet of n × n vertices, flat, waved, or folded over onto itself.
+fn shaped(n: usize, kind: usize) -> (CollisionMesh, Vec<Vec3>) {
+    let sheet = cloth_collision::mesh::generators::grid(1.0, 1.0, n, n).unwrap();
+    let bend = |p: &Vec3| match kind {
+        0 => *p,
+        1 => Vec3::new(p.x, 0.05 * (9.0 * p.x).sin() * (7.0 * p.z).cos(), p.z),
+        _ => {
+            let r = 0.02;
+            let angle = (p.x.max(0.0) / r).min(std::f64::consts::PI);
+            let along = if p.x > 0.0 { r * angle.sin() - (p.x - r * angle) } else { p.x };
+            Vec3::new(along, r * (1.0 - angle.cos()), p.z)
+        }
+    };
+    let x = sheet.vertices.iter().map(bend).collect();
+    (CollisionMesh::single(n * n, &sheet.triangles).unwrap(), x)
+}
+
+#[test]
+fn proofs_of_flatness_change_nothing() {
+    let pool = pool(2);
+    for n in [12, 40] {
+        for kind in 0..3 {
+            let (mesh, x) = shaped(n, kind);
+            // Below the mesh's own distances, among them, and above.
+            for thickness in [1e-3, 0.01, 0.05, 0.1] {
+                let mut bvh = Bvh::new(&mesh, &x).unwrap();
+                let whole = bvh.proximity(&mesh, &x, thickness, None, &pool).unwrap();
+                assert_eq!(bvh.flat_triangles(), 0);
+                let bytes = bvh.bytes();
+                bvh.prove_flatness(true);
+                assert_eq!(bvh.proximity(&mesh, &x, thickness, None, &pool).unwrap(), whole);
+                let flat = bvh.flat_triangles();
+                assert!(bvh.bytes() > bytes);
+                let all = mesh.triangles.len() as u64;
+                match kind {
+                    0 if thickness < 0.5 / n as f64 => assert_eq!(flat, all, "{n} {thickness}"),
+                    2 if thickness >= 0.05 => assert!(flat < all && !whole.is_empty(), "{n} {thickness}"),
+                    _ => assert!(flat <= all),
+                }
+                bvh.prove_flatness(false);
+                assert_eq!((bvh.bytes(), bvh.flat_triangles()), (bytes, 0));
+            }
+        }
+    }
+}

@@ -4,8 +4,8 @@
 mod support;
 
 use cloth_collision::{
-    CollisionMesh, DetectError, Detector, FrameKind, Frames, Mode, Query, SessionOptions, SkippingSession,
-    Vec3,
+    Bvh, CollisionMesh, DetectError, Detector, FrameKind, Frames, Mode, Query, SessionOptions,
+    SkippingSession, Vec3,
 };
 use support::{Random, along, layers, pool, waves};
 
@@ -69,6 +69,36 @@ fn a_stored_pair_takes_at_most_48_bytes() {
         let stats = session.stats();
         assert!(stats.pending > 10_000, "{stats:?}");
         assert!(stats.pair_bytes <= 48 * stats.pending, "{stats:?}");
-        assert!(stats.pair_bytes >= 12 * stats.pending, "{stats:?}");
+        assert!(stats.pair_bytes >= 28 * stats.pending, "{stats:?}");
     }
+}
+
+#[test]
+fn a_frame_that_jumps_by_the_scenes_size_is_answered_and_a_session_follows() {
+    let mut random = Random(23);
+    let (x, triangles) = layers(16, &mut random);
+    let mesh = CollisionMesh::single(x.len(), &triangles).unwrap();
+    let mut session = SkippingSession::new(&mesh, &x, fixed(8)).unwrap();
+    let mut bvh = Bvh::new(&mesh, &x).unwrap();
+    let wave = waves(&x, 0.0003);
+    let away =
+        |x: Vec<Vec3>| -> Vec<Vec3> { x.iter().map(|p| p * 1.2 + Vec3::new(3.0, 5.0, -4.0)).collect() };
+    let mut kinds = vec![];
+    for k in 0..12 {
+        let (x_t0, x_t1) = match k {
+            4 => (wave(k), away(wave(k + 1))),
+            5.. => (away(wave(k)), away(wave(k + 1))),
+            _ => (wave(k), wave(k + 1)),
+        };
+        let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness: 0.02, mode: Mode::Continuous, active: None };
+        let mut found = session.detect(&mesh, &query, &pool(1)).unwrap();
+        let mut expected = bvh.detect(&mesh, &query, &pool(1)).unwrap();
+        (found.stats, expected.stats) = Default::default();
+        assert!(found == expected, "frame {k}");
+        assert!(!found.edge_edge.is_empty());
+        kinds.push(session.stats().kind);
+    }
+    assert_eq!(kinds[3], FrameKind::Skipping);
+    assert_ne!(kinds[4], FrameKind::Skipping, "no ball holds the jump");
+    assert_eq!(kinds[5..7], [FrameKind::First, FrameKind::Skipping]);
 }

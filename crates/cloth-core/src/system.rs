@@ -197,6 +197,11 @@ impl ClothSystem {
         list
     }
 
+    /// How many numbers of [`Self::memory`] belong to each part whose law remembers, in the order of the parts.
+    pub fn memory_sizes(&self) -> Vec<usize> {
+        self.all_models().map(|(_, memory)| memory.len()).filter(|n| *n > 0).collect()
+    }
+
     /// Each hinge of a law with memory as it stands at the accepted positions `x` [m].
     pub fn hinge_states(&self, x: &[Vec3]) -> Vec<HingeState> {
         let memory = self.memory_by_model(x);

@@ -35,18 +35,34 @@ fn wrong(value: &Bound<'_, PyAny>, name: &str, expected: &str) -> PyErr {
 /// # Errors
 /// `InvalidInput` naming the parameter, and for a coordinate that is not finite the vertex.
 pub(crate) fn vertices_from(value: &Bound<'_, PyAny>, name: &str) -> PyResult<Vec<Vec3>> {
+    let mut out = vec![];
+    vertices_into(value, name, &mut out)?;
+    Ok(out)
+}
+
+/// [`vertices_from`] in memory that is there.
+///
+/// # Errors
+/// As [`vertices_from`].
+pub(crate) fn vertices_into(value: &Bound<'_, PyAny>, name: &str, out: &mut Vec<Vec3>) -> PyResult<()> {
     const EXPECTED: &str = "shape (n, 3) and float64";
     let array: PyReadonlyArray2<'_, f64> = value.extract().map_err(|_| wrong(value, name, EXPECTED))?;
     let flat = array.as_slice().map_err(|_| wrong(value, name, EXPECTED))?;
     if array.shape()[1] != 3 {
         return Err(wrong(value, name, EXPECTED));
     }
-    if let Some(at) = flat.iter().position(|coordinate| !coordinate.is_finite()) {
+    // Block by block without a branch per coordinate.
+    let are_finite = |block: &[f64]| block.iter().fold(true, |all, x| all & x.is_finite());
+    let found =
+        if flat.chunks(1024).all(are_finite) { None } else { flat.iter().position(|x| !x.is_finite()) };
+    if let Some(at) = found {
         let row = &flat[at / 3 * 3..at / 3 * 3 + 3];
         let got = format!("({}, {}, {}) at vertex {}", row[0], row[1], row[2], at / 3);
         return Err(invalid_input(value.py(), name, "finite coordinates", &got));
     }
-    Ok(bytemuck::cast_slice::<f64, [f64; 3]>(flat).iter().map(|&p| Vec3::from(p)).collect())
+    out.clear();
+    out.extend_from_slice(bytemuck::cast_slice(flat));
+    Ok(())
 }
 
 /// Triangles from an array of shape (m, 3), int32 or int64; every index in 0..`vertex_count`.

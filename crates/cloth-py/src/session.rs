@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use rayon::ThreadPool;
 
 use crate::collision::{Pairs, mode_from};
-use crate::convert::{indices_to_numpy, triangles_from, vertices_from};
+use crate::convert::{indices_to_numpy, triangles_from, vertices_from, vertices_into};
 use crate::detach::{detached, pool};
 use crate::errors::{detect_error, invalid_input};
 
@@ -37,7 +37,11 @@ struct State {
 
 /// Detection that skips tree updates and traversals.
 #[pyclass(frozen, module = "clothsim._core", name = "SkippingSession")]
-pub(crate) struct PySkippingSession(Mutex<State>);
+pub(crate) struct PySkippingSession {
+    state: Mutex<State>,
+    /// Memory for the positions of both ends of a step.
+    positions: Mutex<[Vec<Vec3>; 2]>,
+}
 
 #[pymethods]
 impl PySkippingSession {
@@ -87,7 +91,8 @@ impl PySkippingSession {
         let most = rest.as_ref().map_or(u32::MAX as usize, Vec::len);
         let triangles = triangles_from(triangles, "triangles", most)?;
         let pool = pool(py, threads)?;
-        Ok(Self(Mutex::new(State { options, triangles, bodies, rest, pool, built: None })))
+        let state = State { options, triangles, bodies, rest, pool, built: None };
+        Ok(Self { state: Mutex::new(state), positions: Mutex::default() })
     }
 
     /// All pairs in contact in one frame, and what the session did.
@@ -100,20 +105,24 @@ impl PySkippingSession {
         mode: &str,
     ) -> PyResult<(Pairs<'py>, Bound<'py, PyDict>)> {
         let mode = mode_from(py, mode)?;
-        let x_t0 = vertices_from(x_t0, "x_t0")?;
-        let x_t1 = vertices_from(x_t1, "x_t1")?;
+        // Memory of the last frame, unless another thread is using it.
+        let [mut x_t0s, mut x_t1s] =
+            std::mem::take(&mut *self.positions.lock().unwrap_or_else(PoisonError::into_inner));
+        vertices_into(x_t0, "x_t0", &mut x_t0s)?;
+        vertices_into(x_t1, "x_t1", &mut x_t1s)?;
+        let (x_t0, x_t1) = (&x_t0s, &x_t1s);
         let work = || {
-            let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
             let State { options, triangles, bodies, rest, pool, built } = &mut *state;
             let Built { mesh, session } = if let Some(built) = built {
                 built
             } else {
                 let mesh = mesh_of(triangles, bodies.as_deref(), x_t0.len())?;
-                let x = rest.as_deref().unwrap_or(&x_t0);
+                let x = rest.as_deref().unwrap_or(x_t0);
                 let session = SkippingSession::new(&mesh, x, *options)?;
                 built.insert(Built { mesh, session })
             };
-            let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
+            let query = Query { x_t0, x_t1, thickness, mode, active: None };
             let contacts = session.detect(mesh, &query, pool)?;
             let edges: Vec<[u32; 4]> = contacts
                 .edge_edge
@@ -125,7 +134,9 @@ impl PySkippingSession {
                 .collect();
             Ok::<_, DetectError>((contacts, edges, session.stats().clone()))
         };
-        let (contacts, edges, stats) = detached(py, work, detect_error)?;
+        let done = detached(py, work, detect_error);
+        *self.positions.lock().unwrap_or_else(PoisonError::into_inner) = [x_t0s, x_t1s];
+        let (contacts, edges, stats) = done?;
         let dict = stats_to_dict(py, &stats)?;
         dict.set_item("broad_phase_tests", contacts.stats.broad_phase_tests)?;
         dict.set_item("leaf_pairs", contacts.stats.leaf_pairs)?;
@@ -142,7 +153,7 @@ impl PySkippingSession {
     /// The next frame starts a session.
     fn restart(&self, py: Python<'_>) {
         py.detach(|| {
-            let mut state = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(built) = &mut state.built {
                 built.session.restart();
             }

@@ -6,7 +6,7 @@ use crate::impulse::{Contact, NormalLaw};
 use crate::motion::Motion;
 use crate::repulsion::rest_gap;
 use crate::sides::{Side, Sides};
-use crate::{ResponseParams, Vec3};
+use crate::{ResponseParams, Resting, Vec3};
 use cloth_collision::{
     Bvh, CollisionMesh, Contacts, DetectError, Detector, Mode, Query, StencilKind, edge_edge_ccd,
     stencil_at_contact, vertex_triangle_ccd,
@@ -80,17 +80,18 @@ pub(crate) struct Detection<'a> {
     pub(crate) mesh: &'a CollisionMesh,
     pub(crate) bvh: &'a mut Bvh,
     pub(crate) other: Option<&'a mut dyn Detector>,
+    /// With sleeping cloth: what moves and what sleeps.
+    pub(crate) resting: Option<Resting<'a>>,
     pub(crate) pool: &'a rayon::ThreadPool,
 }
 
 impl Detection<'_> {
-    /// Everything that comes within `thickness` on the straight motion; with `only_changed`, of the pairs that have a
-    /// changed vertex.
+    /// Everything that comes within `thickness` on the straight motion, of the pairs that have a vertex in `only`.
     pub(crate) fn hits(
         &mut self,
         motion: &Motion<'_>,
         thickness: f64,
-        only_changed: bool,
+        only: Option<&[bool]>,
         out: &mut Vec<Hit>,
     ) -> Result<(), DetectError> {
         let query = Query {
@@ -98,10 +99,10 @@ impl Detection<'_> {
             x_t1: &motion.buffers.end,
             thickness,
             mode: Mode::Continuous,
-            active: only_changed.then_some(&motion.buffers.changed),
+            active: only,
         };
         let contacts = match &mut self.other {
-            Some(detector) if !only_changed || detector.narrows() => {
+            Some(detector) if only.is_none() || detector.narrows() => {
                 detector.detect(self.mesh, &query, self.pool)?
             }
             _ => self.bvh.detect(self.mesh, &query, self.pool)?,
@@ -132,7 +133,7 @@ pub(crate) fn look_again(
 ) -> Result<(), DetectError> {
     let changed = &motion.buffers.changed;
     hits.retain(|hit| !hit.vertices.iter().any(|&v| changed[v as usize]));
-    detection.hits(motion, thickness, true, hits)?;
+    detection.hits(motion, thickness, Some(&motion.buffers.changed), hits)?;
     hits.sort_by_key(Hit::key);
     motion.clear_changed();
     Ok(())

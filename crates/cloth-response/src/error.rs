@@ -51,6 +51,12 @@ pub enum ResponseError {
         /// All vertices of these pairs, sorted, once each.
         vertices: Vec<u32>,
     },
+    /// Something that moves is near sleeping cloth or meets it. Wake that cloth and try again.
+    #[error("sleeping cloth is met, first vertices {:?}", vertices.iter().take(8).collect::<Vec<_>>())]
+    Asleep {
+        /// Its vertices that are met, sorted, once each.
+        vertices: Vec<u32>,
+    },
     /// Edges stay beyond their strain limits: prescribed motions pull them apart, or contact leaves no room. Retry with
     /// a smaller step.
     #[error("{} edges stay beyond their strain limit, by up to {excess:.1e} of their length, first {:?}", edges.len(), edges.iter().take(4).collect::<Vec<_>>())]

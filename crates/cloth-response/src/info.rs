@@ -11,6 +11,12 @@ pub struct ResponseInfo {
     pub by_side: usize,
     /// Continuous detections over the step, the first (over all pairs) included.
     pub passes: usize,
+    /// Triangles that were not searched against their own surface for near pairs, as that proved flat
+    /// ([`cloth_collision::Bvh::prove_flatness`]).
+    pub flat_triangles: u64,
+    /// Vertices that the first continuous detection looked at: all, or with [`crate::ResponseParams::skip_proved`] those that could
+    /// carry a pair across its gap; 0: it was left out.
+    pub looked_at: usize,
     /// Pairs that collided in the first of them: what the repulsion left.
     pub collisions: usize,
     /// Contacts that carry an impulse in the end.
@@ -41,6 +47,8 @@ pub struct ResponseInfo {
     pub largest_stretch: f64,
     /// Largest compression 1 − l/l₀ of an edge whose compression is limited, after the step [-]; 0 without limits.
     pub largest_compression: f64,
+    /// Pairs of bodies with near features, the lower first, where some cloth may sleep ([`crate::Responder::respond_resting`]).
+    pub meetings: Vec<[u32; 2]>,
     /// Seconds per stage, in the order in which the stages run.
     pub seconds: Vec<(&'static str, f64)>,
 }

@@ -24,6 +24,9 @@ pub struct ResponseParams {
     /// Cloth vertices carry on colliders, held by something else: edges and vertices of colliders rest on cloth only at half of
     /// the thickness, so that they stay idle where surfaces are nearly flat.
     pub vertices_carry: bool,
+    /// The first continuous detection leaves out vertices that cannot carry a pair across its gap in the step, and is left out if
+    /// there are no others. Accepted steps do not depend on it.
+    pub skip_proved: bool,
     /// Pairs in contact already at `x_t0` are exempt from acceptance and counted. Without this they make the step
     /// [`ResponseError::Unresolved`].
     pub allow_initial_contacts: bool,
@@ -40,6 +43,7 @@ impl Default for ResponseParams {
             max_sweeps: 15,
             velocity_tolerance: 1e-6,
             vertices_carry: false,
+            skip_proved: false,
             allow_initial_contacts: false,
         }
     }

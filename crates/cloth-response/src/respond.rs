@@ -7,7 +7,7 @@ use crate::motion::{Motion, MotionBuffers};
 use crate::stages::Stages;
 use crate::strain::limiter::Limiter;
 use crate::sweeps::ContactSet;
-use crate::{LimitedEdge, ResponseError, ResponseInfo, ResponseParams, Sides, Vec3};
+use crate::{LimitedEdge, ResponseError, ResponseInfo, ResponseParams, Resting, Sides, Vec3};
 use cloth_collision::{Bvh, CollisionMesh, Detector};
 
 /// Turns the unconstrained end of a step into an accepted one.
@@ -41,8 +41,8 @@ impl Responder {
             } else {
                 Contacts::General(ContactSet::new(General::new(params.friction.laws())))
             },
+            stages: Stages::new(params.skip_proved),
             params,
-            stages: Stages::default(),
         })
     }
 
@@ -135,7 +135,7 @@ impl Responder {
         dt: f64,
         pool: &rayon::ThreadPool,
     ) -> Result<ResponseInfo, ResponseError> {
-        self.run(Detection { mesh, bvh, other: None, pool }, inv_mass, x_t0, x_t1, v, dt)
+        self.run(Detection { mesh, bvh, other: None, resting: None, pool }, inv_mass, x_t0, x_t1, v, dt)
     }
 
     /// [`Responder::respond`] with another method for the continuous detection; `bvh` still finds proximities, and pairs with a
@@ -155,7 +155,48 @@ impl Responder {
         dt: f64,
         pool: &rayon::ThreadPool,
     ) -> Result<ResponseInfo, ResponseError> {
-        self.run(Detection { mesh, bvh, other: Some(continuous), pool }, inv_mass, x_t0, x_t1, v, dt)
+        self.run(
+            Detection { mesh, bvh, other: Some(continuous), resting: None, pool },
+            inv_mass,
+            x_t0,
+            x_t1,
+            v,
+            dt,
+        )
+    }
+
+    /// [`Responder::respond`] where some cloth sleeps: pairs without a vertex that moves are passed over, and
+    /// [`ResponseInfo::meetings`] says which bodies are near each other. `other`: as in [`Responder::respond_with`].
+    ///
+    /// # Errors
+    /// [`ResponseError::Asleep`] if something that moves is near sleeping cloth or meets it; else as [`Responder::respond`].
+    pub fn respond_resting(
+        &mut self,
+        mesh: &CollisionMesh,
+        bvh: &mut Bvh,
+        other: Option<&mut dyn Detector>,
+        resting: Resting<'_>,
+        inv_mass: &[f64],
+        x_t0: &[Vec3],
+        x_t1: &mut [Vec3],
+        v: &mut [Vec3],
+        dt: f64,
+        pool: &rayon::ThreadPool,
+    ) -> Result<ResponseInfo, ResponseError> {
+        for (name, list) in [("moving", resting.moving), ("asleep", resting.asleep)] {
+            if list.len() != mesh.vertex_count {
+                return Err(ResponseError::Length { name, expected: mesh.vertex_count, got: list.len() });
+            }
+        }
+        #[allow(
+            clippy::needless_match,
+            reason = "put together anew, it may live as short as the other references"
+        )]
+        let other: Option<&mut dyn Detector> = match other {
+            Some(detector) => Some(detector),
+            None => None,
+        };
+        self.run(Detection { mesh, bvh, other, resting: Some(resting), pool }, inv_mass, x_t0, x_t1, v, dt)
     }
 
     fn run(

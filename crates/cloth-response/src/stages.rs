@@ -3,17 +3,19 @@
 use crate::collisions::{APPROACH, Detection, Hit, look_again, unresolved};
 use crate::frames::Frames;
 use crate::friction::kernel::Kernel;
+use crate::gaps::Gaps;
 use crate::hold::hold_back;
 use crate::landing::follow;
 use crate::motion::{Motion, bytes_of};
 use crate::repulsion::{self, BAND};
+use crate::resting::{meetings, wake};
 use crate::sides::Sides;
 use crate::strain::limiter::Limiter;
 use crate::sweeps::ContactSet;
 use crate::zones::{Zones, move_zones};
 use crate::{ResponseError, ResponseInfo, ResponseParams, Vec3};
 use cloth_collision::StencilKind;
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::time::Instant;
 
 /// Cap on the times that strain limits are made anew within one pass.
@@ -37,9 +39,16 @@ pub(crate) struct Stages {
     spare_sides: Sides,
     /// Contacts on sides and corners that are in the set already.
     shared: HashSet<[u32; 4]>,
+    /// Which vertices the first detection looks at; none: all.
+    pub(crate) gaps: Option<Gaps>,
 }
 
 impl Stages {
+    /// `skip_proved`: as in [`ResponseParams`].
+    pub(crate) fn new(skip_proved: bool) -> Self {
+        Self { gaps: skip_proved.then(Gaps::default), ..Self::default() }
+    }
+
     /// Memory [B].
     pub(crate) fn bytes(&self) -> usize {
         // A hash set's slots: one byte of control each.
@@ -53,6 +62,7 @@ impl Stages {
             + self.next_sides.as_ref().map_or(0, Sides::bytes)
             + self.spare_sides.bytes()
             + slots
+            + self.gaps.as_ref().map_or(0, Gaps::bytes)
     }
 
     /// Takes over what the last run found out about sides.
@@ -71,8 +81,10 @@ impl Stages {
         motion: &mut Motion<'_>,
     ) -> Result<ResponseInfo, ResponseError> {
         let mut sides = self.next_sides.take().unwrap_or_else(|| std::mem::take(&mut self.spare_sides));
-        let Self { rest_x, limiter, frames, zones, hits, shared, .. } = self;
-        let (mesh, x_t0) = (detection.mesh, motion.x_t0);
+        let Self { rest_x, limiter, frames, zones, hits, shared, gaps, .. } = self;
+        let (mesh, x_t0, resting) = (detection.mesh, motion.x_t0, detection.resting);
+        let moving = resting.map(|r| r.moving);
+        let mut met = BTreeSet::new();
         let mut info = ResponseInfo::default();
         let mut clock = Clock(Instant::now());
         frames.clear(mesh.bodies.len());
@@ -81,8 +93,15 @@ impl Stages {
         hits.clear();
 
         // 1. Near pairs at the start: resting contact and repulsion.
-        let mut near = detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, None, detection.pool)?;
+        let mut near =
+            detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, moving, detection.pool)?;
         info.proximities = near.len();
+        info.flat_triangles = detection.bvh.flat_triangles();
+        if let Some(resting) = resting {
+            info.meetings = meetings(mesh, &near);
+            met.extend(near.iter().flat_map(|s| resting.sleepers(s.vertices)));
+            wake(&met)?;
+        }
         info.by_side = sides.renew(&self.sides, &mut near, mesh, motion);
         info.remembered = sides.pairs().len();
         clock.lap(&mut info, "proximity");
@@ -100,6 +119,9 @@ impl Stages {
         // 2. Collisions during the step, answered by impulses; the first look is at all pairs.
         let mut exempt = HashSet::new();
         let mut judge = |hits: &mut Vec<Hit>| {
+            if let Some(resting) = resting {
+                met.extend(hits.iter().flat_map(|hit| resting.sleepers(hit.vertices)));
+            }
             if params.allow_initial_contacts {
                 hits.retain(|hit| {
                     let out = hit.touches_at_start(x_t0) || sides.is_through(hit.kind, hit.vertices);
@@ -110,7 +132,20 @@ impl Stages {
                 });
             }
         };
-        detection.hits(motion, APPROACH * params.thickness, false, hits)?;
+        let approach = APPROACH * params.thickness;
+        info.looked_at = mesh.vertex_count;
+        if let Some(gaps) = gaps {
+            let (only, count) =
+                gaps.vertices_in_reach(mesh, motion, &near, BAND * params.thickness, approach, moving);
+            info.looked_at = count;
+            // Nearly all: a mask would only cost.
+            let only = if count < mesh.vertex_count / 2 { Some(only) } else { moving };
+            if count > 0 {
+                detection.hits(motion, approach, only, hits)?;
+            }
+        } else {
+            detection.hits(motion, approach, moving, hits)?;
+        }
         motion.clear_changed();
         info.passes = 1;
         judge(hits);
@@ -177,6 +212,7 @@ impl Stages {
             clock.lap(&mut info, "strain");
         }
         info.exempt = exempt.len();
+        wake(&met)?;
         sides.end_step(|kind, vertices| exempt.contains(&(kind, vertices)));
         self.next_sides = Some(sides);
         Ok(info)

@@ -101,6 +101,11 @@ impl Simulation {
         let (start, time) = (self.state.time, self.scene.time);
         let order = order(time.integrator);
         let mut report = StepReport { converged: true, ..StepReport::default() };
+        if end.is_finite() && self.all_rests(end) {
+            self.sleep_through(end, &mut report);
+            (report.dt, report.smallest_dt) = (end - start, end - start);
+            return self.finish_step(report, started.elapsed().as_secs_f64());
+        }
         let mut control = self.state.pace.control;
         if control.size == 0.0 {
             control.size = FIRST;
@@ -131,6 +136,10 @@ impl Simulation {
                 Err(Failure::Stop(error)) => return Err(error),
                 Err(Failure::Device(reason)) => {
                     self.lose_device(&reason)?;
+                    continue;
+                }
+                Err(Failure::Wake(vertices)) => {
+                    self.wake(&vertices)?;
                     continue;
                 }
                 Err(failure) => failure,

@@ -1,13 +1,14 @@
 //! The whole simulation as bytes, and back to the same bits.
 //!
 //! Layout, little-endian: magic, version (u32), length of the payload (u64), payload, FNV-1a checksum of the payload (u64).
-//! Payload: scene (JSON), options, state, what bending laws remember, sides of near pairs, pending steps, the step under
-//! way, assets, report (JSON).
+//! Payload: scene (JSON), options, state, what sleeps, what bending laws remember, sides of near pairs, pending steps, the
+//! step under way, assets, report (JSON).
 
 use crate::auto_step::Control;
 use crate::constraints::Holds;
 use crate::ledger::Ledger;
 use crate::pace::{Pace, Pending, UnderWay};
+use crate::sleep::Rest;
 use crate::step::State;
 use crate::{Assets, Report, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
 use cloth_collision::StencilKind;
@@ -16,7 +17,7 @@ use cloth_response::{Side, Sides};
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
@@ -50,6 +51,8 @@ impl Simulation {
         payload.u64(u64::from(ledger.open));
         payload.f64(ledger.level);
         payload.f64(ledger.scale);
+        payload.numbers(&self.state.rest.asleep.iter().map(|a| f64::from(u8::from(*a))).collect::<Vec<_>>());
+        payload.numbers(&self.state.rest.calm);
         payload.numbers(&self.memory());
         payload.sides(self.contact.as_ref().map_or(&[], |contact| contact.responder.sides().pairs()));
         let pending = self.pending.unwrap_or(Pending { steps: 0, dt: 0.0, end: 0.0 });
@@ -124,6 +127,15 @@ impl Simulation {
         let control = Control { size: payload.f64()?, error: payload.f64()? };
         let ledger = Ledger { open: payload.u64()? != 0, level: payload.f64()?, scale: payload.f64()? };
         let pace = Pace { halvings: halvings as u32, good: good as u32, control, ledger };
+        let rest = Rest {
+            asleep: payload.numbers()?.into_iter().map(|a| a != 0.0).collect(),
+            calm: payload.numbers()?,
+        };
+        let sleepers = if scene.effects.sleep.is_some() { scene.cloth.len() } else { 0 };
+        if [rest.asleep.len(), rest.calm.len()] != [sleepers; 2] {
+            let got = format!("{} and {}", rest.asleep.len(), rest.calm.len());
+            return Err(invalid(format!("{sleepers} states of sleep, and times"), got));
+        }
         let memory = payload.numbers()?;
         let sides = payload.sides()?;
         let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
@@ -133,7 +145,7 @@ impl Simulation {
         if !payload.0.is_empty() {
             return Err(invalid("the end of the payload", format!("{} more bytes", payload.0.len())));
         }
-        let state = State { time, step, x, v, contact_force, holds, pace };
+        let state = State { time, step, x, v, contact_force, holds, pace, rest };
         let mut sim = Self::build(&scene, assets, options, Some(state))?;
         sim.under_way = under_way;
         sim.integrator
@@ -146,6 +158,7 @@ impl Simulation {
         } else if !sides.is_empty() {
             return Err(invalid("no sides of pairs without contact", sides.len().to_string()));
         }
+        sim.rebuild_awake()?;
         sim.pending = (pending.steps > 0).then_some(pending);
         let past: Report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
         let here = std::mem::replace(&mut sim.report, past);

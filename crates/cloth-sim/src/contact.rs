@@ -4,7 +4,7 @@ use crate::bodies::Bodies;
 use crate::constraints::ConstraintStage;
 use crate::device::{Continuous, DeviceError};
 use crate::pins::PinSet;
-use crate::scene::{Contact, ContactMethod};
+use crate::scene::{Choice, Contact, ContactMethod};
 use crate::{Scene, SimError, Simulation, SimulationOptions, Vec3};
 use cloth_collision::{Body, Bvh, CollisionMesh, intersections};
 use cloth_response::{FrictionRule, Responder, ResponseInfo, ResponseParams};
@@ -50,7 +50,8 @@ impl ContactStage {
             mesh.set_attachment(vertex, (bodies.cloth.len() + collider) as u32);
         }
         mesh.sew(&bodies.joined());
-        let bvh = Bvh::new(&mesh, x).map_err(|e| stage("collision mesh", &e))?;
+        let mut bvh = Bvh::new(&mesh, x).map_err(|e| stage("collision mesh", &e))?;
+        bvh.prove_flatness(meets && scene.effects.self_collision == Choice::Auto);
         let continuous = if meets {
             Continuous::choose(&contact.detector, options.device, options.gpu, &mesh, x)
                 .map_err(|error| refused(scene, error))?
@@ -67,6 +68,7 @@ impl ContactStage {
             max_passes: contact.max_passes,
             max_zone_passes: contact.max_zone_passes,
             vertices_carry: constraints.is_some(),
+            skip_proved: meets && scene.effects.ccd == Choice::Auto,
             allow_initial_contacts: allow,
             ..ResponseParams::default()
         };

@@ -44,6 +44,10 @@ impl Simulation {
         if !self.audited || !touches(end) {
             return Ok(ledger);
         }
+        // What sleeps has its own system.
+        if self.sleeper.as_ref().is_some_and(|s| s.awake.is_some()) {
+            return Ok(Ledger::default());
+        }
         let start = &self.state.x;
         if self.pins.vertices.iter().any(|&v| end.x[v as usize] != start[v as usize]) {
             return Ok(Ledger::default());

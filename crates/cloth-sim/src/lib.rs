@@ -25,6 +25,7 @@ mod bodies;
 mod checkpoint;
 mod constraints;
 mod contact;
+mod cost;
 mod error;
 mod guard;
 mod ledger;
@@ -38,6 +39,7 @@ mod report;
 mod restart;
 mod seams;
 mod simulation;
+mod sleep;
 mod step;
 mod untangle;
 

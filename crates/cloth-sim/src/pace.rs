@@ -190,6 +190,11 @@ impl Simulation {
     fn sub_step(&mut self, way: &mut UnderWay) -> Result<(), SimError> {
         let started = Instant::now();
         let whole = 1_u64 << self.scene.time.max_halvings;
+        if way.done == 0 && self.all_rests(way.end) {
+            self.sleep_through(way.end, &mut way.report);
+            way.done = whole;
+            return Ok(());
+        }
         let fraction = |units: u64| units as f64 / whole as f64;
         let least = way.dt * 0.5_f64.powi(ledger::MAX_HALVINGS.min(self.scene.time.max_halvings) as i32);
         let pace = self.state.pace;
@@ -218,6 +223,10 @@ impl Simulation {
                     self.lose_device(&reason)?;
                     continue;
                 }
+                Err(Failure::Wake(vertices)) => {
+                    self.wake(&vertices)?;
+                    continue;
+                }
                 Err(failure) => failure,
             };
             self.refuse(dt, &failure);
@@ -236,6 +245,8 @@ impl Simulation {
         mut wall_seconds: f64,
     ) -> Result<(), SimError> {
         let clock = Instant::now();
+        self.fall_asleep(report.dt)?;
+        report.asleep = self.state.rest.sleepers();
         self.state.step += 1;
         report.step = self.state.step;
         report.time = self.state.time;
@@ -248,6 +259,9 @@ impl Simulation {
         if let Some(contact) = &self.contact {
             self.report.grow("contact", contact.bytes());
             self.report.grow_on_device(contact.continuous.device_bytes());
+        }
+        if let Some(sleeper) = &self.sleeper {
+            self.report.grow("sleep", sleeper.bytes());
         }
         Ok(())
     }
@@ -264,7 +278,7 @@ impl Simulation {
         match failure {
             Failure::Alarm(Alarm { reason, vertices }) => SimError::Diverged { time, reason, vertices },
             Failure::Unresolved { pairs, vertices } => SimError::Stuck { time, pairs, vertices },
-            Failure::Energy { .. } => {
+            Failure::Energy { .. } | Failure::Wake(_) => {
                 SimError::Diverged { time, reason: failure.to_string(), vertices: Vec::new() }
             }
             Failure::Device(reason) => SimError::Stage { stage: "detection", message: reason },

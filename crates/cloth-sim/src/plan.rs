@@ -2,10 +2,11 @@
 
 use crate::bodies::Bodies;
 use crate::contact::ContactStage;
+use crate::cost;
 use crate::friction::LawName;
 use crate::pins::PinSet;
 use crate::report::Detection;
-use crate::scene::{Contact, ContactMethod, Start};
+use crate::scene::{Choice, Contact, ContactMethod, Start};
 use crate::step::State;
 use crate::{Scene, SceneError};
 use cloth_core::{CoreError, Integrator};
@@ -14,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// One effect of the plan.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
     /// Name.
     pub name: String,
@@ -26,6 +27,10 @@ pub struct Effect {
     pub elements: usize,
     /// Memory of its data before the first step [B] (0 if off).
     pub bytes: usize,
+    /// Estimate of what a step takes for it on one thread [ms]: its elements times what one took on the machine of the cost
+    /// model. `None` for an effect that is timed as part of another, and for one that is off.
+    #[serde(default)]
+    pub milliseconds: Option<f64>,
 }
 
 /// The effects of a scene, those that run first.
@@ -83,12 +88,18 @@ impl fmt::Display for Plan {
         }
         let width = self.effects.iter().map(|e| e.name.chars().count()).max().unwrap_or(0);
         for effect in self.effects.iter().filter(|e| e.on) {
-            let size = format!("{:>9}  {:>9}", effect.elements, bytes(effect.bytes));
+            let cost = effect.milliseconds.map_or_else(String::new, |ms| format!("{ms:.3} ms"));
+            let size = format!("{:>9}  {:>9}  {cost:>10}", effect.elements, bytes(effect.bytes));
             writeln!(f, "  on   {:width$}  {size}  {}", effect.name, effect.why)?;
         }
         for effect in self.effects.iter().filter(|e| !e.on) {
-            writeln!(f, "  off  {:width$}  {:20}  {}", effect.name, "", effect.why)?;
+            writeln!(f, "  off  {:width$}  {:32}  {}", effect.name, "", effect.why)?;
         }
+        writeln!(
+            f,
+            "elements, bytes, and what a step takes on one thread: an estimate from {}",
+            cost::source()
+        )?;
         for warning in &self.warnings {
             writeln!(f, "warning: {warning}")?;
         }
@@ -145,13 +156,21 @@ impl Effects {
                 known.bytes += bytes;
             }
             None => {
-                self.on.push(Effect { name: name.into(), on: true, why: why.into(), elements, bytes });
+                self.on.push(Effect {
+                    name: name.into(),
+                    on: true,
+                    why: why.into(),
+                    elements,
+                    bytes,
+                    milliseconds: None,
+                });
             }
         }
     }
 
     fn off(&mut self, name: &str, why: impl Into<String>) {
-        self.off.push(Effect { name: name.into(), on: false, why: why.into(), elements: 0, bytes: 0 });
+        let (name, why) = (name.into(), why.into());
+        self.off.push(Effect { name, on: false, why, elements: 0, bytes: 0, milliseconds: None });
     }
 }
 
@@ -224,6 +243,7 @@ pub(crate) fn build(
     }
     plan_contact(&mut effects, scene, bodies, contact);
     plan_strain(&mut effects, scene, contact);
+    plan_auto(&mut effects, scene, bodies, contact);
     effects.on("guard", "always", bodies.cloth_vertices, 0);
 
     let mut warnings = Vec::new();
@@ -253,6 +273,9 @@ pub(crate) fn build(
     warnings.extend(contact.and_then(|stage| stage.continuous.lack.as_ref()).map(ToString::to_string));
     let triangles = bodies.cloth.iter().map(|c| c.mesh.triangles.len()).sum::<usize>()
         + bodies.colliders.iter().map(|c| c.triangles.len()).sum::<usize>();
+    for effect in &mut effects.on {
+        effect.milliseconds = cost::estimate(&effect.name, effect.elements);
+    }
     effects.on.append(&mut effects.off);
     Plan {
         scene: scene.name.clone(),
@@ -410,6 +433,35 @@ fn plan_strain(effects: &mut Effects, scene: &Scene, stage: Option<&ContactStage
         }
         Some(stage) => {
             effects.on("strain limit", "cloth with strain_limit", stage.limited_edges, stage.bytes());
+        }
+    }
+}
+
+/// What the engine decides by itself, step by step.
+fn plan_auto(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Option<&ContactStage>) {
+    let meeting = stage.filter(|_| scene.contact.is_some());
+    let selves = meeting.is_some_and(|s| s.mesh.bodies.iter().any(|b| b.self_collision));
+    match (scene.effects.self_collision, meeting) {
+        (Choice::On, _) => effects.off("flatness proofs", "effects.self_collision = \"on\""),
+        (Choice::Auto, Some(stage)) if selves => {
+            let why = "effects.self_collision = \"auto\": no search of cloth near itself where normals and contour prove it flat";
+            effects.on("flatness proofs", why, stage.mesh.triangles.len(), 0);
+        }
+        (Choice::Auto, _) => effects.off("flatness proofs", "no cloth meets itself"),
+    }
+    match (scene.effects.ccd, meeting) {
+        (Choice::On, _) => effects.off("gap proofs", "effects.ccd = \"on\""),
+        (Choice::Auto, Some(stage)) => {
+            let why = "effects.ccd = \"auto\": no continuous detection of what moves less than its gap";
+            effects.on("gap proofs", why, stage.mesh.vertex_count, 0);
+        }
+        (Choice::Auto, None) => effects.off("gap proofs", "the scene has no [contact]"),
+    }
+    match scene.effects.sleep {
+        None => effects.off("sleep", "the scene has no effects.sleep"),
+        Some(sleep) => {
+            let why = format!("effects.sleep: cloth slower than {} m/s for {} s", sleep.speed, sleep.time);
+            effects.on("sleep", why, bodies.cloth.len(), 2 * bodies.vertices);
         }
     }
 }

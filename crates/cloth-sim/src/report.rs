@@ -147,6 +147,9 @@ pub struct StepReport {
     pub residual: f64,
     /// Whether every tolerance was met before its cap.
     pub converged: bool,
+    /// Pieces of cloth that sleep at the end.
+    #[serde(default)]
+    pub asleep: usize,
     /// Contact, if the scene has it.
     pub contact: Option<ContactReport>,
     /// Pairs of triangles that pass through each other at the end, counted where the scene allows them.
@@ -168,6 +171,13 @@ pub struct ContactReport {
     /// Pairs whose normal their remembered side decided: they touch but for rounding, or went through.
     #[serde(default)]
     pub by_side: usize,
+    /// Triangles that were proved not to come near their own surface and not searched for it (`effects.self_collision = "auto"`).
+    #[serde(default)]
+    pub flat_triangles: u64,
+    /// Vertices that the first continuous detection looked at; 0: it was proved to find nothing and left out
+    /// (`effects.ccd = "auto"`).
+    #[serde(default)]
+    pub looked_at: usize,
     /// Continuous detections over the step.
     pub passes: usize,
     /// Pairs that collided in the first of them.
@@ -214,6 +224,8 @@ impl ContactReport {
         self.proximities += info.proximities;
         self.remembered += info.remembered;
         self.by_side += info.by_side;
+        self.flat_triangles += info.flat_triangles;
+        self.looked_at += info.looked_at;
         self.passes += info.passes;
         self.collisions += info.collisions;
         self.impulses += info.impulses;

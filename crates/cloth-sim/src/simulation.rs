@@ -7,6 +7,7 @@ use crate::guard::Guard;
 use crate::pace::{Pending, UnderWay};
 use crate::pins::PinSet;
 use crate::scene::{Contact, Start};
+use crate::sleep::{Rest, Sleeper};
 use crate::step::State;
 use crate::untangle::{Limits, Tangled, untangle};
 use crate::{Assets, BodyInfo, EffectCost, Plan, Report, Scene, SimError, Vec3, plan};
@@ -49,6 +50,8 @@ pub struct Simulation {
     pub(crate) integrator: Integrator,
     pub(crate) contact: Option<ContactStage>,
     pub(crate) guard: Guard,
+    /// With `effects.sleep`.
+    pub(crate) sleeper: Option<Sleeper>,
     pub(crate) inv_mass: Vec<f64>,
     /// Whether steps are judged by their energy, see [`crate::ledger`].
     pub(crate) audited: bool,
@@ -145,9 +148,10 @@ impl Simulation {
         let threads = pool.current_num_threads();
         let fallbacks = contact.iter().filter_map(|stage| stage.continuous.lack.clone()).collect();
         let report = Report { effects, threads, detection, fallbacks, ..Report::default() };
-        Ok(Self {
+        let mut sim = Self {
             infos: bodies.infos(scene),
             guard: Guard::new(&bodies),
+            sleeper: None,
             scene: scene.clone(),
             assets,
             options,
@@ -167,7 +171,12 @@ impl Simulation {
             fail: |_, _| false,
             #[cfg(test)]
             accepted: Vec::new(),
-        })
+        };
+        sim.sleeper = Sleeper::new(&sim);
+        if sim.sleeper.is_some() && sim.state.rest.asleep.len() != sim.bodies.cloth.len() {
+            sim.state.rest = Rest::awake(sim.bodies.cloth.len());
+        }
+        Ok(sim)
     }
 
     /// Whether an interrupted [`Simulation::advance`] has something left.
@@ -212,22 +221,15 @@ impl Simulation {
 
     /// Mechanical energy of the cloth [J].
     pub fn energy(&self) -> Energy {
-        self.integrator.system().energy(&self.state.x, &self.state.v)
+        match self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) {
+            None => self.integrator.system().energy(&self.state.x, &self.state.v),
+            Some(awake) => awake.energy(&self.state.x, &self.state.v),
+        }
     }
 
     /// Lumped mass of each cloth vertex [kg].
     pub fn masses(&self) -> &[f64] {
         self.integrator.system().masses()
-    }
-
-    /// Each hinge of a bending law with memory as it stands; none where no material asks for memory.
-    pub fn hinges(&self) -> Vec<cloth_core::bending::HingeState> {
-        self.integrator.system().hinge_states(&self.state.x)
-    }
-
-    /// What bending laws remember of the path so far.
-    pub(crate) fn memory(&self) -> Vec<f64> {
-        self.integrator.system().memory(&self.state.x)
     }
 
     /// Force of contact on each cloth vertex in the last step [N]: of constraints and of impulses, divided by the step; zero
@@ -391,7 +393,7 @@ fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, SimError> {
         .map_err(|error| bad(error.to_string()))
 }
 
-fn environment(scene: &Scene) -> Environment {
+pub(crate) fn environment(scene: &Scene) -> Environment {
     Environment {
         gravity: scene.gravity().into(),
         wind: scene.air.wind.into(),

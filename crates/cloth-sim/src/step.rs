@@ -10,10 +10,11 @@ use crate::guard::Alarm;
 use crate::pace::Pace;
 use crate::pins::PinSet;
 use crate::report::add_seconds;
+use crate::sleep::Rest;
 use crate::{SimError, Simulation, StepReport, Vec3};
 use cloth_collision::DetectError;
 use cloth_core::{Pins, StepInfo};
-use cloth_response::{ResponseError, ResponseInfo};
+use cloth_response::{ResponseError, ResponseInfo, Resting};
 use std::time::Instant;
 
 /// The state that a checkpoint holds.
@@ -29,6 +30,8 @@ pub(crate) struct State {
     pub(crate) holds: Holds,
     /// How large the next attempt is.
     pub(crate) pace: Pace,
+    /// What sleeps; empty in a scene where nothing may.
+    pub(crate) rest: Rest,
 }
 
 impl State {
@@ -59,6 +62,7 @@ impl State {
             contact_force: Vec::new(),
             holds: Holds::default(),
             pace: Pace::default(),
+            rest: Rest::default(),
         }
     }
 
@@ -87,6 +91,8 @@ pub(crate) enum Failure {
     },
     /// The GPU gave no answer, for this reason.
     Device(String),
+    /// Sleeping cloth with these vertices is to wake.
+    Wake(Vec<u32>),
     /// Not a matter of the step's size.
     Stop(SimError),
 }
@@ -141,6 +147,7 @@ impl std::fmt::Display for Failure {
                 write!(f, "contact made {made:.3e} J of mechanical energy beyond {level:.3e} J")
             }
             Self::Device(reason) => write!(f, "no answer of the GPU: {reason}"),
+            Self::Wake(vertices) => write!(f, "{} sleeping vertices are to wake", vertices.len()),
             Self::Stop(error) => error.fmt(f),
         }
     }
@@ -168,7 +175,10 @@ impl Simulation {
     /// Writes a state that has passed every check; laws with memory move on to it, and contact to the last response.
     /// `seconds`: of continuous detection, and of all.
     pub(crate) fn commit(&mut self, state: State, seconds: [f64; 2]) {
-        self.integrator.accept();
+        match self.sleeper.as_mut().and_then(|s| s.awake.as_mut()) {
+            None => self.integrator.accept(),
+            Some(awake) => awake.accept(),
+        }
         self.state = state;
         self.accept_contact(seconds);
     }
@@ -184,6 +194,7 @@ impl Simulation {
 
         self.move_colliders(t1, dt, &mut x, &mut v, report);
         let (pin_x, pin_v) = self.move_pins(t1, dt, &x, report);
+        self.mark_moving(dt, &x, &pin_x)?;
         self.integrator.set_time(t1);
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
@@ -212,13 +223,13 @@ impl Simulation {
                 if self.inv_mass[i] > 0.0 {
                     (v[i] - v_free[i]) / (dt * self.inv_mass[i])
                 } else {
-                    Vec3::zeros()
+                    self.resting_force(i)
                 }
             };
             (0..v.len()).map(force).collect()
         });
-        let (step, pace) = (self.state.step, self.state.pace);
-        Ok((State { time: t1, step, pace, x, v, contact_force, holds }, info))
+        let (step, pace, rest) = (self.state.step, self.state.pace, self.state.rest.clone());
+        Ok((State { time: t1, step, pace, rest, x, v, contact_force, holds }, info))
     }
 
     /// Adds the impulse that contact is expected to give, dt f/m with the force f of the last step.
@@ -259,7 +270,10 @@ impl Simulation {
         } else {
             let pins = Pins { vertices: &self.pins.vertices, x_t1: pin_x, v_t1: pin_v };
             self.expect_contact(dt, v);
-            let info = self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?;
+            let info = match self.sleeper.as_mut().and_then(|s| s.awake.as_mut()) {
+                None => self.integrator.step(x, v, self.state.time, dt, &pins).map_err(failure)?,
+                Some(awake) => awake.step(x, v, self.state.time, dt, &pins)?,
+            };
             self.forget_contact(dt, x, v);
             (info, Holds::default(), 0)
         };
@@ -284,18 +298,32 @@ impl Simulation {
             return Ok(None);
         };
         let (x_t0, masses, pool) = (&self.state.x, &self.inv_mass, &self.pool);
+        if let Some(sleeper) = &mut self.sleeper {
+            let resting = Resting { moving: &sleeper.moving, asleep: &sleeper.asleep };
+            let result = responder.respond_resting(
+                mesh,
+                bvh,
+                continuous.other(),
+                resting,
+                masses,
+                x_t0,
+                x,
+                v,
+                dt,
+                pool,
+            );
+            let mut info = result.map_err(|error| response_failure(error, &sleeper.asleep))?;
+            sleeper.meetings = std::mem::take(&mut info.meetings);
+            for (name, seconds) in &info.seconds {
+                add_seconds(&mut report.seconds, name, *seconds);
+            }
+            return Ok(Some(info));
+        }
         let result = match continuous.other() {
             None => responder.respond(mesh, bvh, masses, x_t0, x, v, dt, pool),
             Some(other) => responder.respond_with(mesh, bvh, other, masses, x_t0, x, v, dt, pool),
         };
-        let info = result.map_err(|error| match error {
-            ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
-            ResponseError::NotFinite { name, vertex } => {
-                Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
-            }
-            ResponseError::Detect(DetectError::Device { reason, .. }) => Failure::Device(reason),
-            other => Failure::Stop(stage("contact", &other)),
-        })?;
+        let info = result.map_err(|error| response_failure(error, &[]))?;
         for (name, seconds) in &info.seconds {
             add_seconds(&mut report.seconds, name, *seconds);
         }
@@ -338,6 +366,24 @@ impl Simulation {
         let result = self.guard.check(&self.state.x, x, v).map_err(Failure::Alarm);
         add_seconds(&mut report.seconds, "guard", clock.elapsed().as_secs_f64());
         result
+    }
+}
+
+/// What an error of the response is to the step loop. `asleep`: per vertex; empty where nothing sleeps.
+fn response_failure(error: ResponseError, asleep: &[bool]) -> Failure {
+    let sleeps = |v: &u32| asleep.get(*v as usize).copied().unwrap_or(false);
+    match error {
+        ResponseError::Asleep { vertices } => Failure::Wake(vertices),
+        // Sleeping cloth does not give way; awake it may.
+        ResponseError::Unresolved { vertices, .. } if vertices.iter().any(sleeps) => {
+            Failure::Wake(vertices.into_iter().filter(sleeps).collect())
+        }
+        ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
+        ResponseError::NotFinite { name, vertex } => {
+            Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
+        }
+        ResponseError::Detect(DetectError::Device { reason, .. }) => Failure::Device(reason),
+        other => Failure::Stop(stage("contact", &other)),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `start = "untangle"`: small penetrations are repaired and listed, others refused with their number.
 
 #![allow(clippy::result_large_err, reason = "an error ends the test: its size costs nothing")]
+#![allow(clippy::unwrap_used, reason = "a failure fails the test")]
 
 mod common;
 
@@ -47,13 +48,6 @@ fn check(text: &str, most: f64) {
     let done = sim.report().untangled.clone().expect("a repair");
     let way: Vec<f64> = sim.all_positions().iter().zip(&before).map(|(a, b)| (a - b).norm()).collect();
     let moved: Vec<(u32, f64)> = (0u32..).zip(way.iter().copied()).filter(|(_, d)| *d > 0.0).collect();
-    println!(
-        "{} pairs, {} passes, {} vertices by at most {:.2e} m",
-        done.pairs,
-        done.passes,
-        moved.len(),
-        done.largest
-    );
     assert_eq!(done.moved, moved);
     assert!(done.pairs > 0 && done.largest > 0.0 && done.largest < most, "{:e}", done.largest);
     assert_eq!(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from clothsim.reproduce import skipping_snapshots as snapshots
-from clothsim.reproduce.contract import Check, Effort, Table
+from clothsim.reproduce.contract import Effort
+from clothsim.reproduce.skipping_snapshots import Shot, checks, draw_titled, here, parameters, shoot, tables
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
 
@@ -15,33 +14,11 @@ THESIS = (
 )
 
 
-def measure(effort: Effort) -> list[snapshots.Shot]:
+def measure(effort: Effort) -> list[Shot]:
     """Make the frames, and count contacts."""
-    return snapshots.shoot(effort, ("one",), "figure 5")
+    return shoot(effort, ("one",), "figure 5")
 
 
-def parameters(measured: Sequence[snapshots.Shot]) -> Mapping[str, Any]:
-    """How the animations came about."""
-    return snapshots.parameters(measured)
-
-
-def tables(measured: Sequence[snapshots.Shot]) -> Mapping[str, Table]:
-    """One row per animation and moment."""
-    return snapshots.tables(measured)
-
-
-def here(measured: Sequence[snapshots.Shot]) -> str:
-    """What there is to detect."""
-    return snapshots.here(measured)
-
-
-def checks(measured: Sequence[snapshots.Shot]) -> Sequence[Check]:
-    """Start, contact, motion."""
-    return snapshots.checks(measured)
-
-
-def draw(measured: Sequence[snapshots.Shot]) -> bytes:
+def draw(measured: Sequence[Shot]) -> bytes:
     """Each animation in a column."""
-    return snapshots.draw(
-        measured, "Figure 5: experiment set one", "By formula, not simulated. Contacts: bvh, continuous."
-    )
+    return draw_titled(measured, "Figure 5: experiment set one")

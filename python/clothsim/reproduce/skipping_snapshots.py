@@ -15,7 +15,7 @@ from clothsim.reproduce.animations import SETS, Animation, Listed
 from clothsim.reproduce.animations.contacts import Contacts, contacts, passing
 from clothsim.reproduce.contract import Check, Effort, Table
 
-__all__ = ["Shot", "checks", "draw", "here", "parameters", "shoot", "tables"]
+__all__ = ["Shot", "checks", "draw_titled", "here", "parameters", "shoot", "tables"]
 
 MOMENTS, QUICK_MOMENTS = (0, 30, 59), (0, 59)  # frames; all but the first are drawn
 COLUMNS = (
@@ -136,8 +136,9 @@ def checks(shots: Sequence[Shot]) -> list[Check]:
     ]  # fmt: skip
 
 
-def draw(shots: Sequence[Shot], title: str, note: str) -> bytes:
+def draw_titled(shots: Sequence[Shot], title: str) -> bytes:
     """Each animation in a column."""
+    note = "By formula, not simulated. Contacts: bvh, continuous."
     columns = [
         [s for s in shots if s.listed is item and s.frame > 0] for item in dict.fromkeys(s.listed for s in shots)
     ]

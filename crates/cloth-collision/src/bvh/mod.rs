@@ -6,6 +6,7 @@
 
 pub(crate) mod build;
 mod deciding;
+mod flatness;
 mod intersections;
 pub(crate) mod leaf_pair;
 mod leaves;
@@ -21,6 +22,7 @@ use crate::contact::check_positions;
 use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use build::Tree;
 use deciding::Deciding;
+use flatness::Flatness;
 use refit::Boxes;
 use std::time::Instant;
 use traverse::traverse;
@@ -38,6 +40,7 @@ pub struct Bvh {
     pub(crate) tree: Tree,
     pub(crate) moving: Boxes<2>,
     pub(crate) still: Boxes<1>,
+    flatness: Option<Flatness>,
 }
 
 impl Bvh {
@@ -69,6 +72,7 @@ impl Bvh {
             tree: build::build(mesh, x, pool),
             moving: Boxes::default(),
             still: Boxes::default(),
+            flatness: None,
         })
     }
 
@@ -77,6 +81,18 @@ impl Bvh {
         self.tree.bytes()
             + Boxes::<2>::bytes(&self.tree, self.vertex_count)
             + Boxes::<1>::bytes(&self.tree, self.vertex_count)
+            + self.flatness.as_ref().map_or(0, Flatness::bytes)
+    }
+
+    /// Whether [`Bvh::proximity`] passes over surfaces that certainly do not meet themselves: normals in a cone and a contour that
+    /// does not come near itself prove it. Costs a pass over the triangles; no answer depends on it.
+    pub fn prove_flatness(&mut self, on: bool) {
+        self.flatness = on.then(Flatness::default);
+    }
+
+    /// Triangles of surfaces that the last [`Bvh::proximity`] did not search against themselves.
+    pub fn flat_triangles(&self) -> u64 {
+        self.flatness.as_ref().map_or(0, |f| f.found.triangles)
     }
 
     pub(crate) fn check_mesh(&self, mesh: &CollisionMesh) -> Result<(), DetectError> {

@@ -38,8 +38,13 @@ impl<'a> Scene<'a> {
         Self::with(mesh, query, Motions::ordered_in(start(query), query.x_t1, order, query.thickness, pool))
     }
 
-    fn with(mesh: &'a CollisionMesh, query: &'a Query<'a>, motions: Motions) -> Self {
+    /// With these motions of the query's vertices.
+    pub(crate) fn with(mesh: &'a CollisionMesh, query: &'a Query<'a>, motions: Motions) -> Self {
         Self { mesh, query, motions, has_exclusions: mesh.has_attachments() || query.active.is_some() }
+    }
+
+    pub(crate) fn into_motions(self) -> Motions {
+        self.motions
     }
 
     /// Whether a pair that shares no vertex is to be decided. The traversal has seen to the bodies.
@@ -52,7 +57,7 @@ impl<'a> Scene<'a> {
 }
 
 /// The positions at the start of the motion.
-fn start<'a>(query: &Query<'a>) -> &'a [Vec3] {
+pub(crate) fn start<'a>(query: &Query<'a>) -> &'a [Vec3] {
     if query.mode == Mode::Continuous { query.x_t0 } else { query.x_t1 }
 }
 
@@ -87,6 +92,26 @@ impl<'a> Narrow<'a> {
 }
 
 impl Narrow<'_> {
+    /// Decides pairs of one kind that share no vertex, the lower edge first; `corners` are their vertices.
+    pub(crate) fn take_strangers(&mut self, kind: StencilKind, pairs: &[[u32; 2]], corners: &[[u32; 4]]) {
+        let scene = self.scene;
+        if !scene.has_exclusions {
+            self.decide(kind, corners, |pair| pairs[pair]);
+            return;
+        }
+        self.waiting.clear();
+        self.vertices.clear();
+        let split = if kind == StencilKind::VertexTriangle { 1 } else { 2 };
+        for (pair, corners) in pairs.iter().zip(corners) {
+            let (first, second) = corners.split_at(split);
+            if scene.is_wanted(first, second) {
+                self.waiting.push(*pair);
+                self.vertices.push(*corners);
+            }
+        }
+        self.decide_waiting(kind);
+    }
+
     /// Decides pairs, notes their contacts by `name` and counts them.
     fn decide<P: Pairs + ?Sized>(&mut self, kind: StencilKind, pairs: &P, name: impl Fn(usize) -> [u32; 2]) {
         let Self { scene, batch, .. } = self;

@@ -34,6 +34,9 @@ impl Bvh {
         query.check(mesh)?;
         self.check_mesh(mesh)?;
         self.refit_still(mesh, &query, pool);
+        if let Some(flatness) = &mut self.flatness {
+            flatness.mark(&mut self.still, &self.tree, mesh, x, thickness, pool);
+        }
         let rows: Vec<Row> = x.iter().map(row).collect();
         let sink = || Near {
             mesh,

@@ -19,6 +19,7 @@ struct Motion([Row; 2]);
 struct Small(SmallRow);
 
 /// Both ends of the motion of all vertices, in double precision and in single precision relative to the scene's middle.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Motions {
     doubles: Vec<Motion>,
     small: Vec<Small>,
@@ -50,6 +51,33 @@ impl Motions {
             thickness,
             small_thickness: thickness * small.factor,
         })
+    }
+
+    /// [`Motions::new_in`] in the same memory, of the vertices that `wanted` marks; what there is of others has no meaning. No
+    /// vertex is farther than `reach` \[m\] from `middle` along an axis.
+    pub(crate) fn refill(
+        &mut self,
+        [start, end]: [&[Vec3]; 2],
+        thickness: f64,
+        (middle, reach): (Vec3, f64),
+        wanted: &[bool],
+        pool: &rayon::ThreadPool,
+    ) {
+        let small = Smaller::about(middle, reach);
+        (self.thickness, self.small_thickness) = (thickness, thickness * small.factor);
+        self.doubles.resize(start.len(), Motion([[0.0; 4]; 2]));
+        self.small.resize(start.len(), Small([0.0; 8]));
+        let Self { doubles, small: smalls, .. } = self;
+        pool.install(|| {
+            let chunks = doubles.par_chunks_mut(VERTEX_CHUNK).zip(smalls.par_chunks_mut(VERTEX_CHUNK));
+            chunks.enumerate().for_each(|(chunk, (doubles, smalls))| {
+                let first = chunk * VERTEX_CHUNK;
+                for k in (0..doubles.len()).filter(|k| wanted[first + k]) {
+                    let (a, b) = (&start[first + k], &end[first + k]);
+                    (doubles[k], smalls[k]) = (Motion([row(a), row(b)]), small.motion(a, b));
+                }
+            });
+        });
     }
 
     /// [`Motions::new_in`] of the vertices in `order`, which number the motions.
@@ -103,7 +131,11 @@ impl Smaller {
         }
         // Halves before the sum: no overflow.
         let middle = lo * 0.5 + hi * 0.5;
-        let reach = (hi - middle).amax().max((middle - lo).amax());
+        Self::about(middle, (hi - middle).amax().max((middle - lo).amax()))
+    }
+
+    /// Of coordinates that differ from the middle's by no more than `reach`.
+    fn about(middle: Vec3, reach: f64) -> Self {
         // Where there is no such power, coordinates that are no numbers: a filter that rejects nothing.
         let factor = match 0.5 * reach.inverse_exponent() {
             factor if reach * factor <= 1.0 && factor.is_normal() => factor,

@@ -6,17 +6,22 @@ use cloth_mesh::NONE;
 
 /// The closed loops that bound the triangles below each block above the leaves.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Contours {
+pub(crate) struct Contours {
     /// Loops of each such block; empty where there is none, or where the triangles do not bound closed loops that pass each
     /// vertex once and have them to their left.
     of_block: Vec<Vec<Vec<u32>>>,
 }
 
 impl Contours {
-    pub(super) fn new(tree: &Tree, mesh: &CollisionMesh) -> Self {
+    pub(crate) fn new(tree: &Tree, mesh: &CollisionMesh) -> Self {
         // Directed sides that the sides of other triangles of the block do not cancel.
         let mut open: Vec<Vec<[u32; 2]>> = Vec::with_capacity(tree.block_count());
         for ids in &tree.triangle_ids {
+            let body = mesh.vertex_body[mesh.triangles[ids[0] as usize][0] as usize];
+            if !mesh.bodies_meet(body, body) {
+                open.push(vec![]);
+                continue;
+            }
             let triangles = ids.iter().filter(|&&t| t != NONE).map(|&t| mesh.triangles[t as usize]);
             open.push(uncancelled(triangles.flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]]).collect()));
         }
@@ -30,8 +35,18 @@ impl Contours {
         Self { of_block }
     }
 
+    /// Memory [B].
+    pub(crate) fn bytes(&self) -> usize {
+        let of_loops = |loops: &Vec<Vec<u32>>| {
+            loops.capacity() * size_of::<Vec<u32>>()
+                + loops.iter().map(|l| l.capacity() * size_of::<u32>()).sum::<usize>()
+        };
+        self.of_block.capacity() * size_of::<Vec<Vec<u32>>>()
+            + self.of_block.iter().map(of_loops).sum::<usize>()
+    }
+
     /// Loops of block `k` of those above the leaves.
-    pub(super) fn of_inner(&self, k: usize) -> &[Vec<u32>] {
+    pub(crate) fn of_inner(&self, k: usize) -> &[Vec<u32>] {
         &self.of_block[k]
     }
 }
@@ -91,7 +106,7 @@ struct Side {
 
 /// Whether the loops, seen along `axis`, are simple, apart from each other, exactly one of them has its inside to its left, and no
 /// vertex comes closer than `clearance` \[m\] to a side that it is not an end of.
-pub(super) fn is_simple(
+pub(crate) fn is_simple(
     loops: &[Vec<u32>],
     axis: &Vec3,
     position: impl Fn(u32) -> Vec3,

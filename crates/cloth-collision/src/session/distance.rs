@@ -11,7 +11,7 @@
 use crate::ccd::lanes::{Lanes, Vector};
 
 /// A position in single precision, and an entry of no meaning.
-pub(super) type Row = [f32; 4];
+pub(crate) type Row = [f32; 4];
 /// Pairs at once.
 pub(super) const PAIRS: usize = 8;
 

@@ -13,7 +13,7 @@
 
 use super::contour::Contours;
 use super::distance::Row;
-use super::room::Room;
+use crate::bounds::LANES;
 use crate::bvh::build::Tree;
 use crate::bvh::refit::Boxes;
 use crate::{CollisionMesh, Vec3};
@@ -62,26 +62,37 @@ impl Cone {
     }
 }
 
+/// Where the vertices are: each within its ball.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Whereabouts<'a> {
+    /// Middles relative to some origin [m].
+    pub(crate) middles: &'a [Row],
+    /// Radii [m].
+    pub(crate) radii: &'a [f32],
+    /// How near two features are to be to meet [m].
+    pub(crate) thickness: f64,
+}
+
 fn point(row: &Row) -> Vec3 {
     Vec3::new(f64::from(row[0]), f64::from(row[1]), f64::from(row[2]))
 }
 
-fn leaf_cone(ids: &[u32], mesh: &CollisionMesh, room: &Room) -> Option<Cone> {
-    let (mut normals, mut count) = ([Vec3::zeros(); crate::bounds::LANES], 0);
+fn leaf_cone(ids: &[u32], mesh: &CollisionMesh, within: &Whereabouts<'_>) -> Option<Cone> {
+    let (mut normals, mut count) = ([Vec3::zeros(); LANES], 0);
     let (mut squared_height, mut radius) = (f64::INFINITY, 0.0f32);
     for &t in ids.iter().filter(|&&t| t != NONE) {
         let corners = mesh.triangles[t as usize];
-        let [a, b, c] = corners.map(|v| point(&room.middles[v as usize]));
+        let [a, b, c] = corners.map(|v| point(&within.middles[v as usize]));
         let n = (b - a).cross(&(c - a));
         let squared_area = n.norm_squared();
         let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
         for v in corners {
-            radius = radius.max(room.radii[v as usize]);
+            radius = radius.max(within.radii[v as usize]);
         }
         squared_height = squared_height.min(squared_area / longest);
         normals[count] = n / squared_area.sqrt();
         count += 1;
-        let needed = 2.0 * f64::from(radius) + room.thickness;
+        let needed = 2.0 * f64::from(radius) + within.thickness;
         // Not a number where the triangle is a point.
         if !(squared_height > needed * needed) {
             return None;
@@ -95,33 +106,35 @@ fn leaf_cone(ids: &[u32], mesh: &CollisionMesh, room: &Room) -> Option<Cone> {
 
 /// Blocks, and triangles below them, that are marked.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Found {
-    pub(super) surfaces: u64,
-    pub(super) triangles: u64,
+pub(crate) struct Found {
+    pub(crate) surfaces: u64,
+    pub(crate) triangles: u64,
 }
 
 /// Marks the largest blocks above the leaves that cannot meet themselves while their vertices stay in their balls. `is_simple`
 /// answers for loops, axis, positions and clearance.
-pub(super) fn mark(
+pub(crate) fn mark(
     boxes: &mut Boxes<1>,
     tree: &Tree,
     mesh: &CollisionMesh,
-    room: &Room,
+    within: &Whereabouts<'_>,
     contours: &Contours,
     is_simple: impl Fn(&[Vec<u32>], &Vec3, &(dyn Fn(u32) -> Vec3 + Sync), f64) -> bool + Sync,
     pool: &rayon::ThreadPool,
 ) -> Found {
     let leaves = tree.triangle_ids.par_iter().with_min_len(CHUNK);
-    let mut cones: Vec<Option<Cone>> =
-        pool.install(|| leaves.map(|ids| leaf_cone(ids, mesh, room)).collect());
+    let meets_itself = |body: u32| mesh.bodies_meet(body, body);
+    let body_of = |ids: &[u32]| mesh.vertex_body[mesh.triangles[ids[0] as usize][0] as usize];
+    let cone =
+        |ids: &[u32; LANES]| meets_itself(body_of(ids)).then(|| leaf_cone(ids, mesh, within)).flatten();
+    let mut cones: Vec<Option<Cone>> = pool.install(|| leaves.map(cone).collect());
     for inner in &tree.inner {
         let children = &cones[inner.first as usize..(inner.first + inner.count) as usize];
-        cones.push(merged(children, room.thickness));
+        cones.push(merged(children, within.thickness));
     }
     // Level by level from above: all of a level at once.
-    let position = |v: u32| point(&room.middles[v as usize]);
+    let position = |v: u32| point(&within.middles[v as usize]);
     let mut found = Found::default();
-    let meets_itself = |body: u32| mesh.bodies_meet(body, body);
     let mut level: Vec<u32> = tree.roots.iter().filter(|r| meets_itself(r.body)).map(|r| r.block).collect();
     loop {
         level.retain(|&block| tree.inner(block).is_some());
@@ -131,7 +144,7 @@ pub(super) fn mark(
         let is_flat = |&block: &u32| {
             let loops = contours.of_inner(block as usize - tree.leaves.len());
             cones[block as usize].as_ref().is_some_and(|cone| {
-                !loops.is_empty() && is_simple(loops, &cone.axis, &position, cone.clearance(room.thickness))
+                !loops.is_empty() && is_simple(loops, &cone.axis, &position, cone.clearance(within.thickness))
             })
         };
         let flat: Vec<bool> = pool.install(|| level.par_iter().map(is_flat).collect());
@@ -177,7 +190,7 @@ fn triangles_below(tree: &Tree, block: u32) -> u64 {
 mod tests {
     use super::super::contour;
     use super::super::dangling::ball_box;
-    use super::super::room::Weights;
+    use super::super::room::{Room, Weights};
     use super::*;
     use crate::{BruteForce, Bvh, Detector, Mode, Query};
 
@@ -216,7 +229,9 @@ mod tests {
         let pool = pool();
         let query = Query { x_t0: x, x_t1: x, thickness: 0.0, mode: Mode::Continuous, active: None };
         let tree = Bvh::new(&mesh, x).unwrap().tree;
-        let room = Room::new(&mesh, &query, Weights { alpha: 0.0, beta: 0.0, gamma: 0.0 }, &pool).unwrap();
+        let samples = super::super::samples::Samples::new(&mesh);
+        let room =
+            Room::new(&mesh, &samples, &query, Weights { alpha: 0.0, beta: 0.0, gamma: 0.0 }, &pool).unwrap();
         let contours = Contours::new(&tree, &mesh);
         let marked = |tested: bool| {
             let mut boxes = Boxes::<1>::default();
@@ -226,7 +241,7 @@ mod tests {
                 |loops: &[Vec<u32>], axis: &Vec3, at: &(dyn Fn(u32) -> Vec3 + Sync), clear: f64| {
                     !tested || contour::is_simple(loops, axis, at, clear)
                 };
-            mark(&mut boxes, &tree, &mesh, &room, &contours, is_simple, &pool)
+            mark(&mut boxes, &tree, &mesh, &room.whereabouts(), &contours, is_simple, &pool)
         };
         let contacts = BruteForce.detect(&mesh, &query, &pool).unwrap();
         (marked(true), marked(false), contacts.vertex_triangle.len() + contacts.edge_edge.len())

@@ -10,9 +10,11 @@ use crate::{CollisionMesh, Vec3};
 use cloth_mesh::NONE;
 
 /// Vertices that a fit looks at, about.
-const SAMPLES: usize = 4096;
+const SAMPLES: usize = 1024;
 /// Rounds of the fit; motion from frame to frame needs two.
 const ROUNDS: usize = 4;
+/// Angle of a round \[rad\] that is the last one.
+const SMALL_TURN: f64 = 1e-6;
 /// Shortening beyond which following is given up for a step.
 const LEAST_SCALE: f64 = 0.99;
 
@@ -77,7 +79,12 @@ impl Frame {
                     inertia[k][k] += square * share;
                 }
             }
-            frame.turn(solve(&inertia, &moment));
+            let turn = solve(&inertia, &moment);
+            frame.turn(turn);
+            // Another round would turn by about the square of this.
+            if turn.norm() < SMALL_TURN {
+                break;
+            }
         }
         frame
     }

@@ -15,26 +15,32 @@
 //! Source: \[wong2010\].
 
 mod adapt;
-mod contour;
+mod balls;
+pub(crate) mod contour;
 mod dangling;
-mod distance;
+pub(crate) mod distance;
 mod every_frame;
-mod flat;
+pub(crate) mod flat;
 mod frame;
 mod options;
 mod pairs;
+mod reach;
 mod room;
+mod samples;
 mod stages;
 mod stats;
 mod work;
 
 use crate::bvh::refit::Boxes;
+use crate::ccd::motions::Motions;
 use crate::{Body, Bvh, CollisionMesh, Contacts, DetectError, Detector, Query, Vec3};
 use adapt::{Adaptation, Plan};
 use contour::Contours;
 use dangling::Upwards;
 use pairs::Pairs;
-use room::{Reach, Room, Weights};
+use reach::Reach;
+use room::{Room, Weights};
+use samples::Samples;
 use std::time::Instant;
 use work::Work;
 
@@ -53,10 +59,17 @@ pub struct SkippingSession {
     bvh: Bvh,
     adaptation: Adaptation,
     running: Option<Running>,
+    /// Those of the present session.
+    pairs: Pairs,
+    /// Which vertices have pairs, or had some in this session.
+    has_pairs: Vec<bool>,
     boxes: Boxes<1>,
     upwards: Option<Upwards>,
     contours: Option<Contours>,
+    samples: Samples,
     reach: Reach,
+    /// Of the vertices that have pairs.
+    motions: Motions,
     /// Tests per dangling leaf when last met one by one, and all at once.
     tests_per_leaf: [Option<f64>; 2],
     stats: SessionStats,
@@ -66,7 +79,6 @@ pub struct SkippingSession {
 #[derive(Debug, Clone)]
 struct Running {
     room: Room,
-    pairs: Pairs,
     frames: u32,
     frames_left: u32,
     /// Of the last frame.
@@ -88,10 +100,14 @@ impl SkippingSession {
             bvh: Bvh::new(mesh, x)?,
             adaptation: Adaptation::new(options.frames),
             running: None,
+            pairs: Pairs::default(),
+            has_pairs: vec![],
             boxes: Boxes::default(),
             upwards: None,
             contours: None,
+            samples: Samples::new(mesh),
             reach: Reach::default(),
+            motions: Motions::default(),
             tests_per_leaf: [None; 2],
             stats: SessionStats::default(),
         })
@@ -115,8 +131,10 @@ impl SkippingSession {
 
     fn check_mesh(&self, mesh: &CollisionMesh) -> Result<(), DetectError> {
         self.bvh.check_mesh(mesh)?;
-        if let Some(t) = (0..self.triangles.len()).find(|&t| self.triangles[t] != mesh.triangles[t]) {
-            return Err(DetectError::ChangedTopology { triangle: t });
+        if self.triangles != mesh.triangles {
+            let differs = |&t: &usize| self.triangles[t] != mesh.triangles[t];
+            let triangle = (0..self.triangles.len()).find(differs).unwrap_or(0);
+            return Err(DetectError::ChangedTopology { triangle });
         }
         if self.bodies != mesh.bodies || self.vertex_body != mesh.vertex_body {
             return Err(DetectError::ChangedBodies);
@@ -190,13 +208,10 @@ impl SkippingSession {
                 let weights = Weights { alpha, beta, gamma };
                 running = self.start(mesh, query, (frames, weights), &mut work, pool);
             }
-            let Some(session) = &mut running else {
+            if running.is_none() {
                 self.stats.kind = FrameKind::Alone;
                 return self.alone(mesh, query, is_planned, pool);
-            };
-            let start = Instant::now();
-            session.room.reach(mesh, query, true, &mut self.reach, pool);
-            self.stats.update_seconds += start.elapsed().as_secs_f64();
+            }
             self.stats.kind = FrameKind::First;
         }
         let Some(mut session) = running else { unreachable!("a frame without a session has returned") };

@@ -70,7 +70,7 @@ impl Default for SessionOptions {
     fn default() -> Self {
         Self {
             variant: Variant::SwD,
-            frames: Frames::Adaptive { first: 4, most: 64 },
+            frames: Frames::Adaptive { first: 8, most: 64 },
             beta: 0.2,
             gamma: 0.1,
             adapt: Adapt::Work,

@@ -1,46 +1,84 @@
 //! The pending list: pairs of features that may come into contact while their vertices stay in their balls.
 
 use super::distance::{PAIRS, Row, eight_edge_edges, eight_vertex_triangles};
-use crate::CollisionMesh;
 use crate::bvh::traverse::{Candidates, Sink};
 use crate::ccd::filter::in_lanes;
+use crate::{CollisionMesh, StencilKind};
 use cloth_mesh::NONE;
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Pairs of one kind: two indices and a distance, 12 bytes each.
+/// Pairs of one kind: two indices, four vertices and a distance, 28 bytes each.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Kind {
-    /// (vertex, triangle), or (edge, edge).
+    /// (vertex, triangle), or (edge, edge), the lower one first.
     pub(super) ids: Vec<[u32; 2]>,
+    /// Their vertices, in this order.
+    pub(super) vertices: Vec<[u32; 4]>,
     /// What the features are certainly apart while their vertices are at the middles of their balls [m].
     pub(super) distances: Vec<f32>,
 }
 
 impl Kind {
-    fn append(&mut self, parts: &[&Self]) {
-        let more = parts.iter().map(|part| part.ids.len()).sum();
+    /// Appends what was found, with its vertices, which are marked.
+    fn append<'a>(
+        &mut self,
+        found: impl Iterator<Item = &'a Found> + Clone,
+        vertices: impl Fn([u32; 2]) -> [u32; 4],
+        has_pairs: &mut [bool],
+    ) {
+        let more = found.clone().map(|part| part.ids.len()).sum();
         self.ids.reserve_exact(more);
+        self.vertices.reserve_exact(more);
         self.distances.reserve_exact(more);
-        for part in parts {
+        for part in found {
             self.ids.extend_from_slice(&part.ids);
             self.distances.extend_from_slice(&part.distances);
+            self.vertices.extend(part.ids.iter().map(|&ids| {
+                let vertices = vertices(ids);
+                for v in vertices {
+                    has_pairs[v as usize] = true;
+                }
+                vertices
+            }));
         }
+        self.shrink();
     }
 
-    fn retain(&mut self, keep: impl Fn([u32; 2]) -> bool) {
+    /// Keeps memory for half as many pairs again.
+    fn shrink(&mut self) {
+        let reserve = self.ids.len() + self.ids.len() / 2;
+        self.ids.shrink_to(reserve);
+        self.vertices.shrink_to(reserve);
+        self.distances.shrink_to(reserve);
+    }
+
+    fn clear(&mut self) {
+        self.ids.clear();
+        self.vertices.clear();
+        self.distances.clear();
+    }
+
+    /// Keeps the pairs without a vertex marked here.
+    fn retain_unmarked(&mut self, marked: &[bool]) {
         let mut kept = 0;
         for k in 0..self.ids.len() {
-            if keep(self.ids[k]) {
-                (self.ids[kept], self.distances[kept]) = (self.ids[k], self.distances[k]);
+            if !self.vertices[k].iter().any(|&v| marked[v as usize]) {
+                self.ids[kept] = self.ids[k];
+                self.vertices[kept] = self.vertices[k];
+                self.distances[kept] = self.distances[k];
                 kept += 1;
             }
         }
         self.ids.truncate(kept);
+        self.vertices.truncate(kept);
         self.distances.truncate(kept);
     }
 
     fn bytes(&self) -> usize {
-        self.ids.capacity() * size_of::<[u32; 2]>() + self.distances.capacity() * size_of::<f32>()
+        self.ids.capacity() * size_of::<[u32; 2]>()
+            + self.vertices.capacity() * size_of::<[u32; 4]>()
+            + self.distances.capacity() * size_of::<f32>()
     }
 }
 
@@ -62,17 +100,37 @@ impl Pairs {
     }
 
     /// Takes off the pairs with a vertex marked here.
-    pub(super) fn remove(&mut self, mesh: &CollisionMesh, marked: &[bool]) {
-        let is_marked = |vertices: &[u32]| vertices.iter().any(|&v| marked[v as usize]);
-        self.vertex_triangle.retain(|[v, t]| !is_marked(&[v]) && !is_marked(&mesh.triangles[t as usize]));
-        self.edge_edge
-            .retain(|[e, f]| !is_marked(&mesh.edges[e as usize]) && !is_marked(&mesh.edges[f as usize]));
+    pub(super) fn remove(&mut self, marked: &[bool]) {
+        self.vertex_triangle.retain_unmarked(marked);
+        self.edge_edge.retain_unmarked(marked);
     }
 
-    pub(super) fn append(&mut self, parts: &[Pairs]) {
-        self.vertex_triangle.append(&parts.iter().map(|p| &p.vertex_triangle).collect::<Vec<_>>());
-        self.edge_edge.append(&parts.iter().map(|p| &p.edge_edge).collect::<Vec<_>>());
+    /// Takes all pairs off and keeps their memory.
+    pub(super) fn clear(&mut self) {
+        self.vertex_triangle.clear();
+        self.edge_edge.clear();
     }
+
+    /// Puts what tasks have found on the list, in their order, and marks its vertices.
+    pub(super) fn append(&mut self, parts: &[[Found; 2]], mesh: &CollisionMesh, has_pairs: &mut [bool]) {
+        let of_triangle = |[v, t]: [u32; 2]| {
+            let [a, b, c] = mesh.triangles[t as usize];
+            [v, a, b, c]
+        };
+        let of_edges = |[e, f]: [u32; 2]| {
+            let ([a, b], [c, d]) = (mesh.edges[e as usize], mesh.edges[f as usize]);
+            [a, b, c, d]
+        };
+        self.vertex_triangle.append(parts.iter().map(|part| &part[0]), of_triangle, has_pairs);
+        self.edge_edge.append(parts.iter().map(|part| &part[1]), of_edges, has_pairs);
+    }
+}
+
+/// Pairs of one kind that a task registers, as in [`Kind`].
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    ids: Vec<[u32; 2]>,
+    distances: Vec<f32>,
 }
 
 /// What of a vertex (a radius, a reach), as the largest of a feature's vertices.
@@ -94,7 +152,8 @@ pub(super) struct Register<'a> {
     /// Only pairs with a vertex marked here.
     pub(super) marked: Option<&'a [bool]>,
     pub(super) thickness: f64,
-    pub(super) pairs: Pairs,
+    /// Vertices and triangles; edges.
+    pub(super) found: [Found; 2],
     pub(super) distance_tests: u64,
     waiting: Vec<([u32; 2], [u32; 4])>,
 }
@@ -113,28 +172,26 @@ impl<'a> Register<'a> {
             radii,
             marked,
             thickness,
-            pairs: Pairs::default(),
+            found: Default::default(),
             distance_tests: 0,
             waiting: vec![],
         }
     }
 
     #[inline]
-    fn decide(
-        &mut self,
-        distances: impl Fn(&[[&Row; 4]; PAIRS]) -> [f32; PAIRS],
-        split: usize,
-        kind: fn(&mut Pairs) -> &mut Kind,
-    ) {
-        let Self { middles, radii, thickness, pairs, waiting, .. } = self;
+    fn decide(&mut self, distances: impl Fn(&[[&Row; 4]; PAIRS]) -> [f32; PAIRS], kind: StencilKind) {
+        let Self { middles, radii, thickness, found: [of_triangles, of_edges], waiting, .. } = self;
         self.distance_tests += waiting.len() as u64;
-        let kind = kind(pairs);
+        let (found, split) = match kind {
+            StencilKind::VertexTriangle => (of_triangles, 1),
+            StencilKind::EdgeEdge => (of_edges, 2),
+        };
         let rows = |pair: &([u32; 2], [u32; 4])| pair.1.map(|v| &middles[v as usize]);
         in_lanes(waiting, rows, distances, |(ids, vertices), bounds, lane| {
             let (distance, (a, b)) = (f64::from(bounds[lane]), vertices.split_at(split));
             if !(distance > most(radii, a) + most(radii, b) + *thickness) {
-                kind.ids.push(ids);
-                kind.distances.push(bounds[lane]);
+                found.ids.push(ids);
+                found.distances.push(bounds[lane]);
             }
         });
         waiting.clear();
@@ -153,16 +210,17 @@ impl Sink for Register<'_> {
                 }
             }
         }
-        self.decide(eight_vertex_triangles, 1, |pairs| &mut pairs.vertex_triangle);
+        self.decide(eight_vertex_triangles, StencilKind::VertexTriangle);
         for [e, f] in candidates.edge_edge.drain(..) {
             if e != NONE && f != NONE {
+                let [e, f] = [e.min(f), e.max(f)];
                 let ([a, b], [c, d]) = (mesh.edges[e as usize], mesh.edges[f as usize]);
                 if a != c && a != d && b != c && b != d && is_wanted([a, b, c, d]) {
                     self.waiting.push(([e, f], [a, b, c, d]));
                 }
             }
         }
-        self.decide(eight_edge_edges, 2, |pairs| &mut pairs.edge_edge);
+        self.decide(eight_edge_edges, StencilKind::EdgeEdge);
     }
 }
 
@@ -172,61 +230,70 @@ const CHUNK: usize = 1 << 14;
 /// What the front-end filter needs to know.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FrontEnd<'a> {
-    pub(super) mesh: &'a CollisionMesh,
     /// How far each vertex is from the middle of its ball [m].
     pub(super) reach: &'a [f32],
-    /// The largest of these [m].
-    pub(super) largest: f32,
     pub(super) thickness: f64,
 }
 
+/// Pairs that may be in contact, and their vertices.
+#[derive(Debug)]
+pub(super) struct Admissible {
+    pub(super) kind: StencilKind,
+    pub(super) pairs: Vec<[u32; 2]>,
+    pub(super) vertices: Vec<[u32; 4]>,
+}
+
 impl FrontEnd<'_> {
-    /// The pairs that may be in contact: apart by no more than their features have moved, and the thickness.
-    fn filter(&self, ids: &[[u32; 2]], distances: &[f32], moved: impl Fn([u32; 2]) -> f64) -> Vec<[u32; 2]> {
-        let mut left = vec![];
-        let farthest = 2.0 * f64::from(self.largest) + self.thickness;
-        for (&pair, &distance) in ids.iter().zip(distances) {
-            let distance = f64::from(distance);
-            // The first comparison needs no vertex.
-            if !(distance > farthest) && !(distance > moved(pair) + self.thickness) {
-                left.push(pair);
-            }
+    /// The pairs of `range` that are apart by no more than their features have moved, and the thickness.
+    fn filter(&self, kind: StencilKind, of: &Kind, range: Range<usize>) -> Admissible {
+        match kind {
+            StencilKind::VertexTriangle => self.filter_split::<1>(kind, of, range),
+            StencilKind::EdgeEdge => self.filter_split::<2>(kind, of, range),
         }
-        left
+    }
+
+    /// `SPLIT`: vertices of the first feature.
+    fn filter_split<const SPLIT: usize>(
+        &self,
+        kind: StencilKind,
+        of: &Kind,
+        range: Range<usize>,
+    ) -> Admissible {
+        let (reach, count) = (self.reach, range.len());
+        let ids = &of.ids[range.clone()];
+        let (of_pairs, distances) = (&of.vertices[range.clone()], &of.distances[range]);
+        let (mut pairs, mut vertices) = (vec![[0; 2]; count], vec![[0; 4]; count]);
+        // Every pair is written, and the next one over it if it is not admissible: no branch on what is hard to foresee.
+        let mut kept = 0;
+        for k in 0..count {
+            let (first, second) = of_pairs[k].split_at(SPLIT);
+            (pairs[kept], vertices[kept]) = (ids[k], of_pairs[k]);
+            let farthest = most(reach, first) + most(reach, second) + self.thickness;
+            kept += usize::from(!(f64::from(distances[k]) > farthest));
+        }
+        pairs.truncate(kept);
+        vertices.truncate(kept);
+        Admissible { kind, pairs, vertices }
     }
 
     /// What each task's pairs leave, in order, as `use_them` makes of it.
     pub(super) fn run<R: Send>(
         &self,
         pairs: &Pairs,
-        use_them: impl Fn(Candidates) -> R + Sync,
+        use_them: impl Fn(Admissible) -> R + Sync,
         pool: &rayon::ThreadPool,
     ) -> Vec<R> {
-        let (mesh, reach) = (self.mesh, self.reach);
-        let of_vertex = |[v, t]: [u32; 2]| most(reach, &[v]) + most(reach, &mesh.triangles[t as usize]);
-        let of_edge =
-            |[e, f]: [u32; 2]| most(reach, &mesh.edges[e as usize]) + most(reach, &mesh.edges[f as usize]);
         let chunks = |kind: &Kind| kind.ids.len().div_ceil(CHUNK);
         let (first, second) = (chunks(&pairs.vertex_triangle), chunks(&pairs.edge_edge));
-        let part = |kind: &'_ Kind, k: usize| k * CHUNK..((k + 1) * CHUNK).min(kind.ids.len());
-        pool.install(|| {
-            (0..first + second)
-                .into_par_iter()
-                .with_max_len(1)
-                .map(|k| {
-                    let mut candidates = Candidates::default();
-                    if k < first {
-                        let (kind, range) = (&pairs.vertex_triangle, part(&pairs.vertex_triangle, k));
-                        let (ids, distances) = (&kind.ids[range.clone()], &kind.distances[range]);
-                        candidates.vertex_triangle = self.filter(ids, distances, of_vertex);
-                    } else {
-                        let (kind, range) = (&pairs.edge_edge, part(&pairs.edge_edge, k - first));
-                        let (ids, distances) = (&kind.ids[range.clone()], &kind.distances[range]);
-                        candidates.edge_edge = self.filter(ids, distances, of_edge);
-                    }
-                    use_them(candidates)
-                })
-                .collect()
-        })
+        let part = |of: &Kind, k: usize| k * CHUNK..((k + 1) * CHUNK).min(of.ids.len());
+        let filter = |k: usize| {
+            let (kind, of, k) = if k < first {
+                (StencilKind::VertexTriangle, &pairs.vertex_triangle, k)
+            } else {
+                (StencilKind::EdgeEdge, &pairs.edge_edge, k - first)
+            };
+            use_them(self.filter(kind, of, part(of, k)))
+        };
+        pool.install(|| (0..first + second).into_par_iter().with_max_len(1).map(filter).collect())
     }
 }

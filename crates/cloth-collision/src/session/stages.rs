@@ -2,12 +2,12 @@
 
 use super::contour::{self, Contours};
 use super::dangling::{Upwards, ball_box, one_by_one, one_by_one_tests};
-use super::pairs::{FrontEnd, Pairs, Register};
-use super::room::{Room, Weights};
+use super::pairs::{Admissible, Found, FrontEnd, Pairs, Register};
+use super::room::{FARTHEST, Room, Weights};
 use super::work::Work;
 use super::{Running, SkippingSession, flat};
 use crate::bvh::leaf_pair;
-use crate::bvh::narrow::{Narrow, Scene, merge};
+use crate::bvh::narrow::{self, Narrow, Scene, merge};
 use crate::bvh::traverse::{Candidates, Sink, Streaming, TraverseCounts, traverse};
 use crate::{CollisionMesh, Contacts, Query, Vec3};
 use std::time::Instant;
@@ -26,32 +26,40 @@ impl SkippingSession {
         pool: &rayon::ThreadPool,
     ) -> Option<Running> {
         let start = Instant::now();
-        let room = Room::new(mesh, query, weights, pool)?;
+        let mut room = Room::new(mesh, &self.samples, query, weights, pool)?;
+        room.reach(mesh, query, true, &mut self.reach, pool);
+        if !(self.reach.extent < FARTHEST) {
+            return None;
+        }
         let tree = &self.bvh.tree;
         let of_vertex = |v: usize| ball_box(&room.middles[v], room.radii[v], room.thickness);
         self.boxes.refit(tree, mesh, of_vertex, None, pool);
         work.updated(mesh.vertex_count, tree.block_count());
-        if self.options.low_curvature {
+        if self.options.low_curvature && tree.roots.iter().any(|root| mesh.bodies_meet(root.body, root.body))
+        {
             let contours = self.contours.get_or_insert_with(|| Contours::new(tree, mesh));
             let is_simple =
                 |loops: &[Vec<u32>], axis: &Vec3, position: &(dyn Fn(u32) -> Vec3 + Sync), clearance| {
                     contour::is_simple(loops, axis, position, clearance)
                 };
-            let flat = flat::mark(&mut self.boxes, tree, mesh, &room, contours, is_simple, pool);
+            let flat =
+                flat::mark(&mut self.boxes, tree, mesh, &room.whereabouts(), contours, is_simple, pool);
             (self.stats.flat_surfaces, self.stats.flat_triangles) = (flat.surfaces, flat.triangles);
         }
         let updated = Instant::now();
         let register =
             || Streaming::new(Register::new(mesh, &room.middles, &room.radii, None, room.thickness));
         let (visits, counts) = traverse(tree, &self.boxes, mesh, pool, register);
-        let mut pairs = Pairs::default();
-        take_registered(visits, counts, &mut pairs, work);
+        self.pairs.clear();
+        self.has_pairs.clear();
+        self.has_pairs.resize(mesh.vertex_count, false);
+        take_registered(visits, counts, mesh, (&mut self.pairs, &mut self.has_pairs), work);
         self.stats.update_seconds += (updated - start).as_secs_f64();
         self.stats.traversal_seconds += updated.elapsed().as_secs_f64();
         // A room smaller than asked for lasts less long.
         let lasting = room.alpha as u32 + 1;
         let frames = if room.alpha < weights.alpha { frames.min(lasting) } else { frames };
-        Some(Running { room, pairs, frames, frames_left: frames - 1, signature: 0 })
+        Some(Running { room, frames, frames_left: frames - 1, signature: 0 })
     }
 
     /// Gives dangling vertices other balls and registers their pairs anew; false if a new session is cheaper.
@@ -73,8 +81,8 @@ impl SkippingSession {
         let mut marked = vec![false; mesh.vertex_count];
         self.reach.dangling.iter().for_each(|&v| marked[v as usize] = true);
         running.room.move_balls(mesh, query, &mut self.reach, running.frames_left);
-        running.pairs.remove(mesh, &marked);
-        work.elementary(0, running.pairs.len() as u64, 0, 0);
+        self.pairs.remove(&marked);
+        work.elementary(0, self.pairs.len() as u64, 0, 0);
         let Room { middles, radii, thickness, .. } = &running.room;
         let (triangles, fitted) = upwards.refit(
             &mut self.boxes,
@@ -107,7 +115,7 @@ impl SkippingSession {
         };
         let which = usize::from(!self.stats.one_by_one);
         self.tests_per_leaf[which] = Some(counts.box_tests as f64 / leaves.len().max(1) as f64);
-        take_registered(visits, counts, &mut running.pairs, work);
+        take_registered(visits, counts, mesh, (&mut self.pairs, &mut self.has_pairs), work);
         self.stats.update_seconds += (updated - start).as_secs_f64();
         self.stats.traversal_seconds += updated.elapsed().as_secs_f64();
         true
@@ -123,24 +131,22 @@ impl SkippingSession {
         pool: &rayon::ThreadPool,
     ) -> Contacts {
         let start = Instant::now();
-        let scene = Scene::new_in(mesh, query, pool);
-        let front_end = FrontEnd {
-            mesh,
-            reach: &self.reach.of_vertex,
-            largest: self.reach.largest,
-            thickness: query.thickness,
-        };
-        let decide = |mut candidates: Candidates| {
+        let mut motions = std::mem::take(&mut self.motions);
+        let about = (running.room.origin, self.reach.extent);
+        motions.refill([narrow::start(query), query.x_t1], query.thickness, about, &self.has_pairs, pool);
+        let scene = Scene::with(mesh, query, motions);
+        let front_end = FrontEnd { reach: &self.reach.of_vertex, thickness: query.thickness };
+        let decide = |admissible: Admissible| {
             let mut narrow = Narrow::new(&scene);
-            let admissible = candidates.vertex_triangle.len() + candidates.edge_edge.len();
-            narrow.take(&mut candidates);
-            (narrow, admissible as u64)
+            narrow.take_strangers(admissible.kind, &admissible.pairs, &admissible.vertices);
+            (narrow, admissible.pairs.len() as u64)
         };
-        let parts = front_end.run(&running.pairs, decide, pool);
+        let parts = front_end.run(&self.pairs, decide, pool);
         self.stats.admissible = parts.iter().map(|p| p.1).sum();
         let out = merge(parts.into_iter().map(|p| p.0));
-        self.stats.pending = running.pairs.len() as u64;
-        self.stats.pair_bytes = running.pairs.bytes() as u64;
+        self.motions = scene.into_motions();
+        self.stats.pending = self.pairs.len() as u64;
+        self.stats.pair_bytes = self.pairs.bytes() as u64;
         work.elementary(
             mesh.vertex_count,
             self.stats.pending,
@@ -155,11 +161,13 @@ impl SkippingSession {
 fn take_registered(
     visits: Vec<Streaming<Register<'_>>>,
     counts: TraverseCounts,
-    pairs: &mut Pairs,
+    mesh: &CollisionMesh,
+    (pairs, has_pairs): (&mut Pairs, &mut [bool]),
     work: &mut Work,
 ) {
     let sinks: Vec<Register<'_>> = visits.into_iter().map(|v| v.sink).collect();
     let distance_tests = sinks.iter().map(|s| s.distance_tests).sum();
-    pairs.append(&sinks.into_iter().map(|s| s.pairs).collect::<Vec<_>>());
+    let found: Vec<[Found; 2]> = sinks.into_iter().map(|s| s.found).collect();
+    pairs.append(&found, mesh, has_pairs);
     work.traversed(counts, distance_tests);
 }

@@ -34,6 +34,7 @@ impl Scene {
         self.positive("output.fps", self.output.fps, "1/s")?;
         self.not_negative("output.checkpoint_interval", self.output.checkpoint_interval, "s")?;
         self.check_contact()?;
+        self.check_effects()?;
         self.check_names()?;
         self.check_all_friction()?;
         self.check_strain_limits()?;
@@ -77,6 +78,21 @@ impl Scene {
             return Err(self
                 .error("contact.detector", format!("one of {detectors:?}"), got)
                 .with_nearest(&contact.detector, detectors.into_iter()));
+        }
+        Ok(())
+    }
+
+    fn check_effects(&self) -> Result<(), SceneError> {
+        let Some(sleep) = &self.effects.sleep else { return Ok(()) };
+        self.positive("effects.sleep.speed", sleep.speed, "m/s")?;
+        self.positive("effects.sleep.time", sleep.time, "s")?;
+        if let Some(i) = self.cloth.iter().position(|c| !(c.regions.is_empty() && c.seams.is_empty())) {
+            let got = format!("effects.sleep with cloth[{i}].regions or seams");
+            return Err(self.error("effects.sleep", "cloth without regions and seams", got));
+        }
+        if self.contact.as_ref().is_some_and(|c| c.method == ContactMethod::Constraints) {
+            let got = "effects.sleep with contact.method = \"constraints\"";
+            return Err(self.error("effects.sleep", "contact.method = \"velocity-filter\"", got));
         }
         Ok(())
     }

@@ -7,6 +7,7 @@ mod check;
 mod check_garment;
 mod cloth;
 mod collider;
+mod effects;
 mod file;
 mod friction;
 mod garment;
@@ -21,6 +22,7 @@ pub use cloth::{
     Pin, RestSource,
 };
 pub use collider::{Collider, SequenceSource, ShapeSource};
+pub use effects::{Choice, Effects, Sleep};
 pub use file::FileReference;
 pub use friction::{Friction, PairFriction, StrainLimitSource, StrainLimitTable};
 pub use garment::{Region, Seam};
@@ -76,6 +78,9 @@ pub struct Scene {
     /// Contact; without this table there is none, and nothing is built for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<Contact>,
+    /// What may be left out where it cannot matter.
+    #[serde(default, skip_serializing_if = "Effects::is_default")]
+    pub effects: Effects,
     /// Pieces of cloth.
     #[serde(default)]
     pub cloth: Vec<Cloth>,

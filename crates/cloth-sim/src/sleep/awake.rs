@@ -1,0 +1,216 @@
+//! The dynamics of the cloth that is awake, rebuilt whenever something falls asleep or wakes.
+
+use crate::constraints::failure;
+use crate::guard::Alarm;
+use crate::step::Failure;
+use crate::{SimError, Simulation, Vec3, plan};
+use cloth_core::{Bending, ClothPart, ClothSystem, Energy, Integrator, Pins, StepInfo};
+use std::ops::Range;
+use std::sync::Arc;
+
+/// The dynamics of awake cloth: its vertices without gaps.
+pub(crate) struct Awake {
+    /// `None`: all sleep.
+    pub(crate) integrator: Option<Integrator>,
+    cloths: Vec<usize>,
+    /// The vertex of each of its own.
+    vertices: Vec<usize>,
+    /// Its own index of awake pins, and their places in the list of all.
+    pins: Vec<u32>,
+    pin_rows: Vec<usize>,
+    /// Of what sleeps.
+    energy: Energy,
+}
+
+impl Awake {
+    fn gather(&self, all: &[Vec3]) -> Vec<Vec3> {
+        self.vertices.iter().map(|&i| all[i]).collect()
+    }
+
+    pub(crate) fn energy(&self, x: &[Vec3], v: &[Vec3]) -> Energy {
+        let mut energy = self.energy;
+        if let Some(integrator) = &self.integrator {
+            energy += integrator.system().energy(&self.gather(x), &self.gather(v));
+        }
+        energy
+    }
+
+    /// [`Integrator::step`] of the awake cloth among the vertices of all bodies; `pins`: all of the scene's.
+    pub(crate) fn step(
+        &mut self,
+        x: &mut [Vec3],
+        v: &mut [Vec3],
+        time: f64,
+        dt: f64,
+        pins: &Pins<'_>,
+    ) -> Result<StepInfo, Failure> {
+        let (mut own_x, mut own_v) = (self.gather(x), self.gather(v));
+        let rows = |all: &[Vec3]| self.pin_rows.iter().map(|&row| all[row]).collect::<Vec<_>>();
+        let (pin_x, pin_v) = (rows(pins.x_t1), rows(pins.v_t1));
+        let Some(integrator) = &mut self.integrator else {
+            return Ok(StepInfo { converged: true, ..StepInfo::default() });
+        };
+        let own_pins = Pins { vertices: &self.pins, x_t1: &pin_x, v_t1: &pin_v };
+        let own_index =
+            |vertices: Vec<u32>| vertices.iter().map(|&i| self.vertices[i as usize] as u32).collect();
+        let info =
+            integrator.step(&mut own_x, &mut own_v, time, dt, &own_pins).map_err(|error| {
+                match failure(error) {
+                    Failure::Alarm(alarm) => {
+                        Failure::Alarm(Alarm { vertices: own_index(alarm.vertices), ..alarm })
+                    }
+                    other => other,
+                }
+            })?;
+        for (own, &i) in self.vertices.iter().enumerate() {
+            (x[i], v[i]) = (own_x[own], own_v[own]);
+        }
+        Ok(info)
+    }
+
+    pub(crate) fn accept(&mut self) {
+        if let Some(integrator) = &mut self.integrator {
+            integrator.accept();
+        }
+    }
+
+    pub(super) fn bytes(&self) -> usize {
+        self.integrator.as_ref().map_or(0, Integrator::bytes)
+            + self.vertices.len() * size_of::<usize>()
+            + self.pins.len() * (size_of::<u32>() + size_of::<usize>())
+    }
+}
+
+impl Simulation {
+    /// What bending laws remember of the path so far.
+    pub(crate) fn memory(&self) -> Vec<f64> {
+        let mut memory = self.integrator.system().memory(&self.state.x);
+        let Some(awake) = self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) else { return memory };
+        let Some(integrator) = &awake.integrator else { return memory };
+        let own = integrator.system().memory(&awake.gather(&self.state.x));
+        let mut rest = &own[..];
+        for (cloth, range) in self.memory_ranges() {
+            if awake.cloths.contains(&cloth) {
+                let (mine, others) = rest.split_at(range.len());
+                memory[range].copy_from_slice(mine);
+                rest = others;
+            }
+        }
+        memory
+    }
+
+    /// The cloths whose law remembers, and where their numbers stand in [`Simulation::memory`].
+    fn memory_ranges(&self) -> Vec<(usize, Range<usize>)> {
+        let remembers = |c: &usize| {
+            let body = &self.bodies.cloth[*c];
+            matches!(body.material.bending, Bending::Plastic(_) | Bending::Hysteresis(_))
+                && !body.topology.hinges.is_empty()
+        };
+        let mut first = 0;
+        let sizes = self.integrator.system().memory_sizes();
+        let cloths = (0..self.bodies.cloth.len()).filter(remembers);
+        cloths
+            .zip(sizes)
+            .map(|(cloth, size)| {
+                first += size;
+                (cloth, first - size..first)
+            })
+            .collect()
+    }
+
+    /// Makes dynamics, masses and marks those of the cloth that is awake.
+    pub(crate) fn rebuild_awake(&mut self) -> Result<(), SimError> {
+        if self.sleeper.is_none() {
+            return Ok(());
+        }
+        let memory = self.memory();
+        let stage = |error: cloth_core::CoreError| crate::contact::stage("sleep", &error);
+        self.integrator.set_memory(&memory).map_err(stage)?;
+        let Some(mut sleeper) = self.sleeper.take() else { return Ok(()) };
+        for (c, range) in sleeper.cloths.iter().enumerate() {
+            sleeper.asleep[range.clone()].fill(self.state.rest.asleep[c]);
+        }
+        let masses = self.integrator.system().masses();
+        for (i, m) in masses.iter().enumerate() {
+            self.inv_mass[i] = if sleeper.asleep[i] { 0.0 } else { m.recip() };
+        }
+        for &v in &self.pins.vertices {
+            self.inv_mass[v as usize] = 0.0;
+        }
+        let any = self.state.rest.asleep.contains(&true);
+        // While none sleeps, all count as moving; else each attempt marks what does.
+        sleeper.moving.fill(true);
+        sleeper.awake = any.then(|| self.awake(&memory)).transpose()?;
+        self.sleeper = Some(sleeper);
+        Ok(())
+    }
+
+    /// The dynamics of awake cloth with its part of `memory`.
+    fn awake(&self, memory: &[f64]) -> Result<Awake, SimError> {
+        let cloths: Vec<usize> =
+            (0..self.bodies.cloth.len()).filter(|&c| !self.state.rest.asleep[c]).collect();
+        let (mut vertices, mut parts) = (Vec::new(), Vec::new());
+        for &c in &cloths {
+            let body = &self.bodies.cloth[c];
+            parts.push(ClothPart {
+                mesh: &body.mesh,
+                topology: &body.topology,
+                rest: &body.rest,
+                material: &body.material,
+                first_vertex: vertices.len(),
+                triangles: None,
+            });
+            vertices.extend(body.first_vertex..body.first_vertex + body.x.len());
+        }
+        let (mut pins, mut pin_rows) = (Vec::new(), Vec::new());
+        for (row, &v) in self.pins.vertices.iter().enumerate() {
+            if let Ok(own) = vertices.binary_search(&(v as usize)) {
+                pins.push(own as u32);
+                pin_rows.push(row);
+            }
+        }
+        let energy = self.integrator.system().energy(&self.state.x, &self.state.v);
+        let mut awake = Awake { integrator: None, cloths, vertices, pins, pin_rows, energy };
+        if awake.cloths.is_empty() {
+            return Ok(awake);
+        }
+        let error =
+            |error: cloth_core::CoreError| SimError::InvalidScene(plan::core_error(&self.scene, &error));
+        let environment = crate::simulation::environment(&self.scene);
+        let system = ClothSystem::new(&parts, &environment, awake.vertices.len()).map_err(error)?;
+        let params = *self.integrator.params();
+        let mut integrator = Integrator::new(system, params, Arc::clone(&self.pool)).map_err(error)?;
+        let ranges = self.memory_ranges().into_iter().filter(|(cloth, _)| awake.cloths.contains(cloth));
+        let own: Vec<f64> = ranges.flat_map(|(_, range)| memory[range].iter().copied()).collect();
+        integrator.set_memory(&own).map_err(error)?;
+        let of_awake = integrator.system().energy(&awake.gather(&self.state.x), &awake.gather(&self.state.v));
+        awake.energy = minus(energy, of_awake);
+        awake.integrator = Some(integrator);
+        Ok(awake)
+    }
+
+    /// Each hinge of a bending law with memory as it stands; none where no material asks for memory.
+    pub fn hinges(&self) -> Vec<cloth_core::bending::HingeState> {
+        let mut hinges = self.integrator.system().hinge_states(&self.state.x);
+        let Some(awake) = self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) else { return hinges };
+        let Some(integrator) = &awake.integrator else { return hinges };
+        let own = integrator.system().hinge_states(&awake.gather(&self.state.x));
+        let is_awake = |hinge: &cloth_core::bending::HingeState| {
+            awake.vertices.binary_search(&(hinge.vertices[0] as usize)).is_ok()
+        };
+        for (hinge, mine) in hinges.iter_mut().filter(|h| is_awake(h)).zip(own) {
+            *hinge = cloth_core::bending::HingeState { vertices: hinge.vertices, ..mine };
+        }
+        hinges
+    }
+}
+
+fn minus(a: Energy, b: Energy) -> Energy {
+    Energy {
+        kinetic: a.kinetic - b.kinetic,
+        stretch: a.stretch - b.stretch,
+        shear: a.shear - b.shear,
+        bending: a.bending - b.bending,
+        gravity: a.gravity - b.gravity,
+    }
+}
