@@ -5,7 +5,7 @@
 mod support;
 
 use cloth_core::{Bending, Environment, InPlane, Integrator, Material, Method, Pins, mesh::Vec3};
-use support::{FREE, integrator, params, sheet, system};
+use support::{integrator, params, sheet, system};
 
 /// Energy [J] after each step of a stiff sheet that swings down from two corners, and Newton iterations in all.
 fn swing(stiffness: f64, dt: f64, method: Method, mends: bool) -> (Vec<f64>, usize) {
@@ -15,7 +15,7 @@ fn swing(stiffness: f64, dt: f64, method: Method, mends: bool) -> (Vec<f64>, usi
         in_plane: InPlane::Spring { stiffness, damping: 0.0 },
         bending: Bending::None,
     };
-    let gravity = Environment { gravity: Vec3::new(0.0, -9.81, 0.0), ..FREE };
+    let gravity = Environment { gravity: Vec3::new(0.0, -9.81, 0.0), ..Environment::default() };
     let mut integrator: Integrator = integrator(system(&mesh, &material, &gravity), params(method));
     integrator.mend_overshoots(mends);
     let (mut x, mut v) = (mesh.vertices.clone(), vec![Vec3::zeros(); mesh.vertices.len()]);
