@@ -37,7 +37,7 @@ pub(super) fn step(
     if pins.mends && overshoots(&work.matrix, &candidate) {
         let (seconds, forces) = (work.clock.seconds(), system.seconds(&work.corners.clock));
         work.hold_trials(system.vertex_count());
-        let mut info = newton::step(work, system, params, x, v, dt, pins, set)?;
+        let mut info = newton::step(work, system, &mending(params), x, v, dt, pins, set)?;
         info.linear_iterations += solved.iterations;
         info.newton_iterations += 1;
         add(&mut info.seconds, &seconds);
@@ -57,6 +57,18 @@ pub(super) fn step(
         seconds: work.clock.seconds(),
         forces: system.seconds(&work.corners.clock),
     })
+}
+
+/// Newton's method as far as it takes to make no energy: each iterate lowers the incremental potential, and what is left of the
+/// residual after a few is where cloth buckles, which would take tens of iterations more to settle.
+fn mending(params: &IntegratorParams) -> IntegratorParams {
+    const TOLERANCE: f64 = 1e-3;
+    const ITERATIONS: usize = 12;
+    IntegratorParams {
+        newton_tolerance: params.newton_tolerance.max(TOLERANCE),
+        newton_max_iterations: params.newton_max_iterations.min(ITERATIONS),
+        ..params.clone()
+    }
 }
 
 /// Adds seconds to those of the same name.
