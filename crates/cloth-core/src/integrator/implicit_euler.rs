@@ -67,7 +67,7 @@ fn mending(params: &IntegratorParams) -> IntegratorParams {
     IntegratorParams {
         newton_tolerance: params.newton_tolerance.max(TOLERANCE),
         newton_max_iterations: params.newton_max_iterations.min(ITERATIONS),
-        ..params.clone()
+        ..*params
     }
 }
 
