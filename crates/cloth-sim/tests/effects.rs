@@ -62,7 +62,7 @@ fn a_drape_is_the_same_bits_with_auto() {
 #[test]
 fn a_crumpling_sheet_is_the_same_bits_with_auto() {
     let [_, flat, collisions] = compare(&crumple(19), 130);
-    assert!(flat > 0 && collisions > 100, "{flat} {collisions}");
+    assert!(flat > 0 && collisions > 20, "{flat} {collisions}");
 }
 
 /// Two napkins on a floor, a metre apart; a ball comes down on the first one after a second.
