@@ -111,6 +111,34 @@ pub fn spinning_ball(n: usize) -> Result<Sequence, SequenceError> {
     Ok(Sequence { mesh, rest, position: Box::new(position) })
 }
 
+/// A cloth of n × n vertices, 1.8 m wide, over a ball of 20 · 4^`level` triangles that turns with it: it lies `lift` \[m\] above the
+/// ball and hangs in six folds that do not overhang or touch. With n · 2^k vertices, `level` + k, and `lift` and time between
+/// frames over 2^k, all is the same in lengths of edges, but for the curvature.
+///
+/// # Errors
+/// If `n` is too small for a mesh, or `level` too large.
+pub fn draped_ball(n: usize, level: u32, lift: f64) -> Result<Sequence, SequenceError> {
+    let (cloth, ball) = (generators::grid(1.8, 1.8, n, n)?, generators::sphere(RADIUS, level)?);
+    let (mesh, rest) = (scene(&cloth, &ball)?, rest(&cloth, &ball));
+    let position = move |time: f64| {
+        let (sin, cos) = (RATE * time).sin_cos();
+        let spin = |p: Vec3| Vec3::new(cos * p.x - sin * p.z, p.y, sin * p.x + cos * p.z);
+        let on_cloth = cloth.vertices.iter().map(|p| {
+            let (r, around) = (p.x.hypot(p.z), p.z.atan2(p.x));
+            let arc = (r / RADIUS).min(0.5 * PI);
+            let hanging = (r - 0.5 * PI * RADIUS).max(0.0);
+            let fold = (hanging / 0.3).min(1.0);
+            let phase = 6.0 * around + 0.8 * (3.0 * time).sin();
+            let out = (RADIUS + lift) * arc.sin() + 0.2 * hanging + 0.05 * fold * phase.sin();
+            let height = (RADIUS + lift) * arc.cos() - hanging;
+            spin(Vec3::new(out * around.cos(), height, out * around.sin()))
+        });
+        let on_ball = ball.vertices.iter().map(|&p| spin(p));
+        on_cloth.chain(on_ball).collect()
+    };
+    Ok(Sequence { mesh, rest, position: Box::new(position) })
+}
+
 /// A cloth of n × n vertices, 2 m wide, that is folded in the middle and settles onto itself from 20 mm to 2 mm, with travelling
 /// waves and shivers; a ball below it.
 ///

@@ -44,7 +44,7 @@ class SkippingSession:
     beta, gamma : float
         β and γ: the room of a vertex is ½(1+α) v Δt + β v′Δt + γ t′, with the mean speed v′ and edge length t′.
     first_frames, most_frames : int
-        n_f of the first session, and the largest, where it is adapted.
+        n_f of the first session (less where the motion is large), and the largest, where it is adapted.
     adapt : {"work", "time"}
         Adapt n_f to counted work, so that runs repeat to the bit, or to measured time.
     low_curvature : bool

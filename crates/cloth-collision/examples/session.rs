@@ -1,8 +1,8 @@
 //! Detection over coherent sequences by every variant of the session, frame by frame in turn: seconds per stage and counts.
 //!
 //! `cargo run --release -p cloth-collision --example session -- [vertices per side] [frames] [thickness in mm] [threads]
-//! [variant]`; with a variant alone, a profiler counts what that one does. `... -- sizes [threads]`: the spinning ball from 10,000
-//! to a million triangles, time between frames and thickness in proportion to the edges, and the exponent of the cost.
+//! [variant]`; with a variant alone, a profiler counts what that one does. `... -- sizes [threads]`: a draped ball from 17,000
+//! to a million triangles, everything in proportion to the edges, and the exponent of the cost.
 
 #![allow(clippy::unwrap_used, reason = "a measurement that cannot start has nothing to report")]
 #![allow(clippy::print_stdout, reason = "the table is its result")]
@@ -14,7 +14,7 @@ mod sequences;
 use cloth_collision::{
     Detector, FrameKind, Frames, Mode, Query, SessionOptions, SessionStats, SkippingSession, Variant,
 };
-use sequences::{Sequence, folding, spinning_ball};
+use sequences::{Sequence, draped_ball, folding, spinning_ball};
 use std::time::Instant;
 
 #[derive(Default)]
@@ -131,27 +131,31 @@ fn measure(name: &str, sequence: &Sequence, frames: u32, thickness: f64, threads
     }
 }
 
-/// Vertices along a side: about 10,000, 31,600, 100,000, 316,000 and a million triangles.
-const SIDES: [usize; 5] = [71, 127, 224, 399, 708];
+/// Vertices along a side of the coarsest cloth, and the subdivisions of its ball; each size has edges half as long.
+const COARSEST: (usize, u32) = (76, 4);
+const SIZES: u32 = 4;
 const FRAMES: u32 = 24;
 
 fn sizes(threads: usize) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    println!("spinning ball, SwD, {FRAMES} frames, {threads} threads, means per frame");
-    println!("{:>10} {:>9} {:>14} {:>9} {:>10}", "triangles", "ms", "ns / triangle", "work", "colliding");
+    println!("draped ball, SwD, {FRAMES} frames, {threads} threads, means per frame");
+    println!(
+        "{:>10} {:>9} {:>14} {:>9} {:>10} {:>10} {:>21}",
+        "triangles", "ms", "ns / triangle", "work", "admissible", "colliding", "colliding / triangle"
+    );
     let mut points = vec![];
-    for n in SIDES {
-        let sequence = spinning_ball(n).unwrap();
+    for k in 0..SIZES {
+        let shorter = f64::from(1u32 << k);
+        let thickness = 0.003 / shorter;
+        let sequence = draped_ball(COARSEST.0 << k, COARSEST.1 + k, 0.5 * thickness).unwrap();
         let (mesh, rest) = (&sequence.mesh, &sequence.rest);
-        let fine = 221.0 / n as f64;
-        let at = |frame: u32| sequence.at_time(f64::from(frame) * sequences::DT * fine);
+        let at = |frame: u32| sequence.at_time(f64::from(frame) * 2.0 * sequences::DT / shorter);
         let mut session = SkippingSession::new(mesh, rest, SessionOptions::default()).unwrap();
         let mut sum = Sum::default();
         let mut x_t0 = at(0);
         for frame in 0..FRAMES {
             let x_t1 = at(frame + 1);
-            let (thickness, mode) = (1e-3 * fine, Mode::Continuous);
-            let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode, active: None };
+            let query = Query { x_t0: &x_t0, x_t1: &x_t1, thickness, mode: Mode::Continuous, active: None };
             let start = Instant::now();
             session.detect(mesh, &query, &pool).unwrap();
             sum.add(start.elapsed().as_secs_f64(), session.stats());
@@ -159,12 +163,14 @@ fn sizes(threads: usize) {
         }
         let (triangles, frames) = (mesh.triangles.len() as f64, f64::from(FRAMES));
         let seconds = sum.seconds / frames;
-        let (work, colliding) = (sum.work as f64 / frames, sum.colliding as f64 / frames);
+        let [work, admissible, colliding] =
+            [sum.work, sum.admissible, sum.colliding].map(|count| count as f64 / frames);
         let per_triangle = 1e9 * seconds / triangles;
         println!(
-            "{triangles:>10} {:>9.2} {per_triangle:>14.1} {:>9.1} {colliding:>10.0}",
+            "{triangles:>10} {:>9.2} {per_triangle:>14.1} {:>9.1} {admissible:>10.0} {colliding:>10.0} {:>21.3}",
             1e3 * seconds,
-            1e-6 * work
+            1e-6 * work,
+            colliding / triangles
         );
         points.push([triangles.ln(), seconds.ln(), work.ln()]);
     }

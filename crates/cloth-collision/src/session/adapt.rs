@@ -12,6 +12,10 @@ const DOUBTFUL: f64 = 0.75;
 const SURE: u32 = 16;
 /// n_f moves on by its quarter, at least by one.
 const STEP: u32 = 4;
+/// n_f of the first session times the square root of the mean step in mean edge lengths, by measurement. Per frame, a session
+/// costs its first frame over n_f and tests of the pairs in reach of the balls, which grow with n_f steps: the sum is least near
+/// an n_f that is inverse to the root of the step.
+const FIRST: f64 = 1.2;
 /// Of two sessions in a row, the second is worse beyond this: scenes change, too.
 const WORSE: f64 = 1.02;
 
@@ -31,6 +35,8 @@ pub(super) enum Plan {
 pub(super) struct Adaptation {
     rule: Frames,
     frames: u32,
+    /// No motion has been seen.
+    is_fresh: bool,
     is_growing: bool,
     previous: Option<f64>,
     /// Cost of a frame alone.
@@ -51,6 +57,7 @@ impl Adaptation {
         Self {
             rule,
             frames,
+            is_fresh: matches!(rule, Frames::Adaptive { .. }),
             is_growing: true,
             previous: None,
             alone: None,
@@ -61,6 +68,20 @@ impl Adaptation {
             cost: 0.0,
             count: 0,
             first: 0.0,
+        }
+    }
+
+    /// Whether n_f is to be chosen from the motion.
+    pub(super) fn is_fresh(&self) -> bool {
+        self.is_fresh
+    }
+
+    /// Chooses the first n_f for a motion of so many mean edge lengths per step: the rule's, or less.
+    pub(super) fn starts_with(&mut self, steps_in_edges: f64) {
+        self.is_fresh = false;
+        let most = FIRST / steps_in_edges.sqrt();
+        if most < f64::from(self.frames) {
+            self.frames = (most.round() as u32).max(self.frames.min(2));
         }
     }
 
@@ -202,6 +223,23 @@ mod tests {
         assert_eq!(seen[..7], [4, 5, 6, 7, 8, 10, 12]);
         assert_eq!(*seen.iter().max().unwrap(), 20);
         assert!(seen[1..].contains(&1), "measured again: {seen:?}");
+    }
+
+    #[test]
+    fn the_first_session_is_shorter_where_motion_is_larger() {
+        let first = |steps_in_edges: f64| {
+            let mut adaptation = Adaptation::new(Frames::Adaptive { first: 8, most: 20 });
+            assert!(adaptation.is_fresh());
+            adaptation.starts_with(steps_in_edges);
+            assert!(!adaptation.is_fresh());
+            match adaptation.plan() {
+                Plan::Session { frames, .. } => frames,
+                Plan::Alone => 1,
+            }
+        };
+        let motions = [0.0, 0.02, 0.04, 0.1, 0.3, 10.0, f64::INFINITY, f64::NAN];
+        assert_eq!(motions.map(first), [8, 8, 6, 4, 2, 2, 2, 8]);
+        assert!(!Adaptation::new(Frames::Fixed { frames: 8, alpha: None }).is_fresh());
     }
 
     #[test]

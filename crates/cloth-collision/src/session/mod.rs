@@ -197,6 +197,9 @@ impl SkippingSession {
         self.stats.kind = FrameKind::Skipping;
         if running.is_none() {
             self.adaptation.session_ends();
+            if self.adaptation.is_fresh() {
+                self.adaptation.starts_with(room::steps_in_edges(mesh, &self.samples, query));
+            }
             let plan = match self.options.variant {
                 Variant::NSwD => Plan::Session { frames: 1, alpha: 0.0 },
                 _ => self.adaptation.plan(),

@@ -26,9 +26,9 @@ pub enum Frames {
         /// α: the inflation covers so many steps of each vertex at its present speed.
         alpha: Option<f64>,
     },
-    /// Adapted to the cost of detection, starting from `first`, at most `most`.
+    /// Adapted to the cost of detection, starting from `first` or, where the motion is large, from less; at most `most`.
     Adaptive {
-        /// n_f of the first session.
+        /// n_f of the first session at most.
         first: u32,
         /// Largest n_f.
         most: u32,

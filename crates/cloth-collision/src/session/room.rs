@@ -58,6 +58,33 @@ pub(super) struct Room {
     pub(super) following: Following,
 }
 
+/// How far the bodies move in a step, relative to the rigid motion of the whole scene if that is less.
+struct Motion {
+    origin: Vec3,
+    following: Following,
+    steps: Steps,
+    /// Mean length of the dynamic bodies' edges \[m\].
+    edge: f64,
+}
+
+impl Motion {
+    fn new(mesh: &CollisionMesh, samples: &Samples, query: &Query<'_>) -> Self {
+        let Query { x_t0, x_t1, .. } = *query;
+        let origin = middle(x_t0);
+        let before = |v: usize| x_t0[v] - origin;
+        let following = Following::fit(mesh, before, &origin, [x_t0, x_t1], &Frame::at_rest());
+        let steps = Steps::new(samples, mesh, query, &origin, &following);
+        let following = if steps.is_less_following { following } else { Following::none() };
+        Self { origin, following, steps, edge: samples.mean_edge(x_t1) }
+    }
+}
+
+/// Mean step of the dynamic vertices in `query`, in mean edge lengths, as a session would see it.
+pub(super) fn steps_in_edges(mesh: &CollisionMesh, samples: &Samples, query: &Query<'_>) -> f64 {
+    let Motion { steps, edge, .. } = Motion::new(mesh, samples, query);
+    steps.mean_over_dynamic(&steps.mean) / edge
+}
+
 impl Room {
     /// Balls for the motion of `query` and (1+α) times its length; None if they had to be too large.
     pub(super) fn new(
@@ -67,25 +94,14 @@ impl Room {
         weights: Weights,
         pool: &rayon::ThreadPool,
     ) -> Option<Self> {
-        let Query { x_t0, x_t1, .. } = *query;
-        let origin = middle(x_t0);
-        let before = |v: usize| x_t0[v] - origin;
-        let following = Following::fit(mesh, before, &origin, [x_t0, x_t1], &Frame::at_rest());
-        let steps = Steps::new(samples, mesh, query, &origin, &following);
+        let Motion { origin, following, steps, edge } = Motion::new(mesh, samples, query);
         let is_following = steps.is_less_following;
-        let following = if is_following { following } else { Following::none() };
-        let edge = samples.mean_edge(x_t1);
         // What does not move at all needs no room; a frame that is followed comes with its rounding.
         let moves = |mean: f64| is_following || mean > 0.0;
         let slack_of = |mean: f64| if moves(mean) { weights.beta * mean + weights.gamma * edge } else { 0.0 };
         let slack: Vec<f64> = steps.mean.iter().map(|&mean| slack_of(mean)).collect();
         // Mean over the dynamic vertices of ½(1+α) v Δt + slack ≤ most.
-        let weigh = |of_body: &dyn Fn(usize) -> f64| {
-            let counted: f64 = steps.count.iter().map(|&n| n as f64).sum();
-            let sum: f64 = (0..mesh.bodies.len()).map(|b| steps.count[b] as f64 * of_body(b)).sum();
-            if counted > 0.0 { sum / counted } else { 0.0 }
-        };
-        let (mean_step, mean_slack) = (weigh(&|b| steps.mean[b]), weigh(&|b| slack[b]));
+        let (mean_step, mean_slack) = (steps.mean_over_dynamic(&steps.mean), steps.mean_over_dynamic(&slack));
         let mut alpha = weights.alpha;
         if 0.5 * (1.0 + alpha) * mean_step + mean_slack > MOST_ROOM * edge {
             alpha = 2.0 * (MOST_ROOM * edge - mean_slack) / mean_step - 1.0;

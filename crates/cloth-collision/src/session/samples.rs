@@ -82,6 +82,13 @@ impl Steps {
             is_less_following,
         }
     }
+
+    /// Mean over the dynamic bodies' vertices of a number of each body; 0 without such vertices.
+    pub(super) fn mean_over_dynamic(&self, of_body: &[f64]) -> f64 {
+        let counted: f64 = self.count.iter().map(|&n| n as f64).sum();
+        let sum: f64 = self.count.iter().zip(of_body).map(|(&n, x)| n as f64 * x).sum();
+        if counted > 0.0 { sum / counted } else { 0.0 }
+    }
 }
 
 #[cfg(test)]
