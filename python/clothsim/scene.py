@@ -44,6 +44,9 @@ class Scene:
         The axis that points up; the default gravity follows it.
     gravity : (3,) array, optional
         Acceleration [m/s²]; 9.81 m/s² against ``up`` by default.
+    start : {"as-given", "untangle"}
+        What is done about a start state whose surfaces pass through each other: it is refused, or small penetrations
+        are repaired and listed in the report.
     time, solver, air, contact, effects, output : mapping, optional
         Tables of a scene file. Without ``contact`` nothing touches anything. `set_friction` adds friction of two
         bodies, once they are there.
@@ -80,6 +83,7 @@ class Scene:
         cloth: Sequence[Mapping[str, Any]] = (),
         collider: Sequence[Mapping[str, Any]] = (),
         output: Mapping[str, Any] | None = None,
+        start: str = "as-given",
     ) -> None:
         self._meshes: dict[str, Mesh] = {}
         self._sequences: dict[str, tuple[Floats, Ints, float | None]] = {}
@@ -88,7 +92,7 @@ class Scene:
         self.folder: Path | None = None
         tables = {
             "name": name, "up": up, "gravity": None if gravity is None else np.asarray(gravity), "duration": duration,
-            "time": time, "solver": solver, "air": air, "contact": contact, "effects": effects,
+            "start": start, "time": time, "solver": solver, "air": air, "contact": contact, "effects": effects,
             "output": output,
         }  # fmt: skip
         self._data: dict[str, Any] = plain(tables, "")

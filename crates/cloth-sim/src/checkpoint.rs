@@ -1,11 +1,13 @@
 //! The whole simulation as bytes, and back to the same bits.
 //!
 //! Layout, little-endian: magic, version (u32), length of the payload (u64), payload, FNV-1a checksum of the payload (u64).
-//! Payload: scene (JSON), options, state, what sleeps, what bending laws remember, sides of near pairs, pending steps, assets,
-//! report (JSON).
+//! Payload: scene (JSON), options, state, what sleeps, what bending laws remember, sides of near pairs, pending steps, the
+//! step under way, assets, report (JSON).
 
+use crate::auto_step::Control;
 use crate::constraints::Holds;
-use crate::simulation::Pending;
+use crate::ledger::Ledger;
+use crate::pace::{Pace, Pending, UnderWay};
 use crate::sleep::Rest;
 use crate::step::State;
 use crate::{Assets, Report, Scene, Sequence, SimError, Simulation, SimulationOptions, Vec3};
@@ -41,6 +43,14 @@ impl Simulation {
         payload.points(&self.state.holds.force);
         payload
             .numbers(&self.state.holds.sliding.iter().map(|s| f64::from(u8::from(*s))).collect::<Vec<_>>());
+        payload.u64(u64::from(self.state.pace.halvings));
+        payload.u64(u64::from(self.state.pace.good));
+        payload.f64(self.state.pace.control.size);
+        payload.f64(self.state.pace.control.error);
+        let ledger = self.state.pace.ledger;
+        payload.u64(u64::from(ledger.open));
+        payload.f64(ledger.level);
+        payload.f64(ledger.scale);
         payload.numbers(&self.state.rest.asleep.iter().map(|a| f64::from(u8::from(*a))).collect::<Vec<_>>());
         payload.numbers(&self.state.rest.calm);
         payload.numbers(&self.memory());
@@ -49,6 +59,15 @@ impl Simulation {
         payload.u64(pending.steps);
         payload.f64(pending.dt);
         payload.f64(pending.end);
+        payload.u64(u64::from(self.under_way.is_some()));
+        if let Some(way) = &self.under_way {
+            payload.f64(way.start);
+            payload.f64(way.end);
+            payload.f64(way.dt);
+            payload.u64(way.done);
+            payload.text(&serde_json::to_string(&way.report).unwrap_or_default());
+            payload.f64(way.wall_seconds);
+        }
         payload.assets(&self.assets);
         payload.text(&serde_json::to_string(&self.report.without_steps_before(first)).unwrap_or_default());
 
@@ -100,6 +119,14 @@ impl Simulation {
         }
         let sliding = sliding.into_iter().map(|s| s != 0.0).collect();
         let holds = Holds { force, sliding };
+        let (halvings, good) = (payload.u64()?, payload.u64()?);
+        let most = u64::from(scene.time.max_halvings);
+        if halvings > most || good > u64::from(u32::MAX) {
+            return Err(invalid(format!("at most {most} halvings"), halvings.to_string()));
+        }
+        let control = Control { size: payload.f64()?, error: payload.f64()? };
+        let ledger = Ledger { open: payload.u64()? != 0, level: payload.f64()?, scale: payload.f64()? };
+        let pace = Pace { halvings: halvings as u32, good: good as u32, control, ledger };
         let rest = Rest {
             asleep: payload.numbers()?.into_iter().map(|a| a != 0.0).collect(),
             calm: payload.numbers()?,
@@ -112,17 +139,15 @@ impl Simulation {
         let memory = payload.numbers()?;
         let sides = payload.sides()?;
         let pending = Pending { steps: payload.u64()?, dt: payload.f64()?, end: payload.f64()? };
+        let under_way = if payload.u64()? == 0 { None } else { Some(payload.under_way(1 << most)?) };
         let assets = payload.assets()?;
         let report = payload.text()?;
         if !payload.0.is_empty() {
             return Err(invalid("the end of the payload", format!("{} more bytes", payload.0.len())));
         }
-        let mut sim = Self::build(
-            &scene,
-            assets,
-            options,
-            Some(State { time, step, x, v, contact_force, holds, rest }),
-        )?;
+        let state = State { time, step, x, v, contact_force, holds, pace, rest };
+        let mut sim = Self::build(&scene, assets, options, Some(state))?;
+        sim.under_way = under_way;
         sim.integrator
             .set_memory(&memory)
             .map_err(|e| invalid("what this scene's laws remember", e.to_string()))?;
@@ -344,6 +369,17 @@ impl Reader<'_> {
     ) -> Result<BTreeMap<String, T>, SimError> {
         let count = self.count(1)?;
         (0..count).map(|_| Ok((self.text()?, read(self)?))).collect()
+    }
+
+    /// A step of which some of `whole` parts are done.
+    fn under_way(&mut self, whole: u64) -> Result<UnderWay, SimError> {
+        let (start, end, dt, done) = (self.f64()?, self.f64()?, self.f64()?, self.u64()?);
+        if !(1..whole).contains(&done) {
+            return Err(invalid(format!("1 to {} parts of a step", whole - 1), done.to_string()));
+        }
+        let report = serde_json::from_str(&self.text()?)
+            .map_err(|e| invalid("the report of a step", e.to_string()))?;
+        Ok(UnderWay { start, end, dt, done, report, wall_seconds: self.f64()? })
     }
 
     fn assets(&mut self) -> Result<Assets, SimError> {

@@ -15,8 +15,12 @@ pub enum SimError {
     /// The start state has intersections and the scene does not allow them.
     #[error(
         "start state: expected no intersections, got {count} pairs of triangles that pass through each other; the first: {}; \
-         contact.allow_intersections runs all the same",
-        list(names)
+         {}contact.allow_intersections runs all the same",
+        list(names),
+        match tangled {
+            Some(before) => format!("start = \"untangle\" leaves these of {before}: it moves no vertex far; "),
+            None => "start = \"untangle\" repairs small ones, ".into(),
+        }
     )]
     StartIntersections {
         /// How many pairs of triangles.
@@ -25,6 +29,8 @@ pub enum SimError {
         pairs: Vec<[u32; 2]>,
         /// The first pairs in words: body and triangle of each.
         names: Vec<String>,
+        /// With `start = "untangle"`: how many pairs there were before; those listed could not be resolved.
+        tangled: Option<usize>,
     },
     /// The state became non-finite or ran away, at every step size tried.
     #[error("diverged at t = {time} s: {reason}{}", if vertices.is_empty() { String::new() } else { format!("; vertices {}", list(vertices)) })]

@@ -20,6 +20,7 @@ pub mod friction;
 pub mod scene;
 
 mod assets;
+mod auto_step;
 mod bodies;
 mod checkpoint;
 mod constraints;
@@ -27,7 +28,9 @@ mod contact;
 mod cost;
 mod error;
 mod guard;
+mod ledger;
 mod motion;
+mod pace;
 mod pins;
 mod plan;
 mod precision;
@@ -38,13 +41,18 @@ mod seams;
 mod simulation;
 mod sleep;
 mod step;
+mod untangle;
 
 pub use assets::{Assets, Sequence};
 pub use bodies::{BodyInfo, BodyKind};
 pub use error::SimError;
+pub use pace::Advance;
 pub use plan::{Effect, Plan};
-pub use report::{Chosen, ContactReport, Detection, EffectCost, Fallback, Report, StepReport, Totals};
+pub use report::{
+    Chosen, ContactReport, Detection, EffectCost, Fallback, Refused, Report, StepReport, Totals,
+};
 pub use scene::{Scene, SceneError};
-pub use simulation::{Advance, Simulation, SimulationOptions};
+pub use simulation::{Simulation, SimulationOptions};
+pub use untangle::Untangled;
 
 use cloth_core::mesh::Vec3;

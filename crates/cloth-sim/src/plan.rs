@@ -6,7 +6,7 @@ use crate::cost;
 use crate::friction::LawName;
 use crate::pins::PinSet;
 use crate::report::Detection;
-use crate::scene::{Choice, Contact, ContactMethod};
+use crate::scene::{Choice, Contact, ContactMethod, Start};
 use crate::step::State;
 use crate::{Scene, SceneError};
 use cloth_core::{CoreError, Integrator};
@@ -58,6 +58,18 @@ impl Plan {
     /// Names of the effects that run.
     pub fn running(&self) -> impl Iterator<Item = &str> {
         self.effects.iter().filter(|e| e.on).map(|e| e.name.as_str())
+    }
+
+    /// Says what untangling the start state did.
+    pub(crate) fn note_untangled(&mut self, done: &crate::Untangled) {
+        if let Some(effect) = self.effects.iter_mut().find(|e| e.name == UNTANGLED) {
+            effect.elements = done.moved.len();
+            let what = match done.pairs {
+                0 => "nothing passed through anything".to_owned(),
+                n => format!("{n} pairs resolved, vertices moved by at most {:.3e} m", done.largest),
+            };
+            effect.why = format!("{}: {what}", effect.why);
+        }
     }
 }
 
@@ -125,6 +137,9 @@ const DYNAMICS: [(&str, &str, &str); 11] = [
     ("stitches", "cloth with seams", "no cloth has seams"),
     ("hysteresis", "bending.model = \"hysteresis\"", "no material has bending.model = \"hysteresis\""),
 ];
+
+/// The effect of `start = "untangle"`.
+const UNTANGLED: &str = "untangled start";
 
 /// Collects effects that are on and effects that are off.
 #[derive(Default)]
@@ -209,6 +224,12 @@ pub(crate) fn build(
         bodies.cloth_vertices,
         integrator.bytes(),
     );
+    plan_steps(&mut effects, scene, bodies);
+    match (scene.start, &scene.contact) {
+        (Start::Untangle, Some(_)) => effects.on(UNTANGLED, "start = \"untangle\"", 0, 0),
+        (Start::Untangle, None) => effects.off(UNTANGLED, "the scene has no [contact]"),
+        (Start::AsGiven, _) => effects.off(UNTANGLED, "start = \"as-given\""),
+    }
     let explicit = method.is_explicit();
     if explicit {
         effects.off("linear solver", "the integrator is explicit");
@@ -227,10 +248,10 @@ pub(crate) fn build(
 
     let mut warnings = Vec::new();
     let stable_dt = method.has_stability_limit().then(|| integrator.stable_step(&state.x, &state.v));
-    if let Some(stable) = stable_dt.filter(|stable| scene.time.dt > *stable) {
+    if let Some(stable) = stable_dt.filter(|stable| scene.time.fixed().is_some_and(|dt| dt > *stable)) {
         warnings.push(format!(
             "time.dt = {} s is above the largest stable step of \"{}\", about {stable:.3e} s: the run is likely to diverge",
-            scene.time.dt,
+            scene.time.largest(),
             kebab(&method)
         ));
     }
@@ -261,13 +282,41 @@ pub(crate) fn build(
         effects: effects.on,
         cloth_vertices: bodies.cloth_vertices,
         triangles,
-        dt: scene.time.dt,
+        dt: scene.time.largest(),
         stable_dt: stable_dt.filter(|s| s.is_finite()),
         detection: contact
             .filter(|_| scene.contact.is_some())
             .map(|stage| stage.continuous.detection.clone()),
         warnings,
     }
+}
+
+/// How steps are cut: where one fails, and by their error.
+fn plan_steps(effects: &mut Effects, scene: &Scene, bodies: &Bodies) {
+    const ADAPTIVE: &str = "adaptive step";
+    const CONTROLLED: &str = "error-controlled step";
+    let time = &scene.time;
+    let Some(dt) = time.fixed() else {
+        let why = format!(
+            "time.dt = \"auto\": steps of {} to {} s whose estimated error is at most {} m",
+            time.dt_min, time.dt_max, time.dt_tolerance
+        );
+        // Four more states: position, velocity and force of contact.
+        let bytes = 4 * 3 * size_of::<crate::Vec3>() * bodies.vertices;
+        effects.on(CONTROLLED, why, bodies.cloth_vertices, bytes);
+        effects
+            .off(ADAPTIVE, "time.dt is \"auto\": a step that fails is halved by the error-controlled step");
+        return;
+    };
+    let floor = (dt / (1_u64 << time.max_halvings) as f64).max(time.dt_min.min(dt));
+    if floor < dt {
+        let why =
+            format!("a step that fails is halved, to {floor:.3e} s at the least, and grows back slowly");
+        effects.on(ADAPTIVE, why, 0, 0);
+    } else {
+        effects.off(ADAPTIVE, "time.max_halvings is zero, or time.dt_min leaves no room");
+    }
+    effects.off(CONTROLLED, "time.dt is a number");
 }
 
 fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Option<&ContactStage>) {

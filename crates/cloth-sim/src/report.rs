@@ -25,6 +25,28 @@ pub struct Report {
     /// What `contact.detector = "auto"` chose by measuring.
     #[serde(default)]
     pub choices: Vec<Chosen>,
+    /// The first attempts at a step that were given up (at most 64; `totals.retries` counts all).
+    #[serde(default)]
+    pub refused: Vec<Refused>,
+    /// What `start = "untangle"` did; none where the start state was clean.
+    #[serde(default)]
+    pub untangled: Option<crate::Untangled>,
+}
+
+/// Attempts that a report lists.
+pub(crate) const MAX_REFUSED: usize = 64;
+
+/// An attempt at a step that was given up without a trace.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Refused {
+    /// Number of the step, from 1.
+    pub step: u64,
+    /// Where the attempt began [s].
+    pub time: f64,
+    /// Its size [s].
+    pub dt: f64,
+    /// What was wrong.
+    pub reason: String,
 }
 
 /// A detector that was chosen by measuring.
@@ -98,10 +120,25 @@ pub struct StepReport {
     pub time: f64,
     /// Its size [s].
     pub dt: f64,
-    /// Sub-steps taken: 1 unless it was retried smaller.
+    /// Sub-steps taken: 1 unless the size was reduced.
     pub substeps: u32,
     /// Attempts given up on the way.
     pub retries: u32,
+    /// Size of the smallest sub-step [s]; under `time.dt = "auto"` the step's, which is taken in two halves.
+    #[serde(default)]
+    pub smallest_dt: f64,
+    /// Energy that contact made out of nothing, and smaller sub-steps too [J].
+    #[serde(default)]
+    pub energy_made: f64,
+    /// Attempts refused because of their error, under `time.dt = "auto"`.
+    #[serde(default)]
+    pub rejected: u32,
+    /// Estimated error [m], under `time.dt = "auto"`.
+    #[serde(default)]
+    pub error: Option<f64>,
+    /// Whether that is above the tolerance, and smaller steps did not help.
+    #[serde(default)]
+    pub above_tolerance: bool,
     /// Newton iterations.
     pub newton_iterations: usize,
     /// Iterations of the linear solver.
@@ -232,6 +269,27 @@ pub struct Totals {
     pub substeps: u64,
     /// Attempts given up.
     pub retries: u64,
+    /// Attempts refused because of their error, under `time.dt = "auto"`.
+    #[serde(default)]
+    pub rejected: u64,
+    /// Steps whose estimated error is above the tolerance all the same.
+    #[serde(default)]
+    pub above_tolerance: u64,
+    /// Energy that contact made out of nothing, smaller sub-steps too [J].
+    #[serde(default)]
+    pub energy_made: f64,
+    /// Size of the largest step [s].
+    #[serde(default)]
+    pub largest_dt: f64,
+    /// Steps whose size was reduced because one failed.
+    #[serde(default)]
+    pub reduced: u64,
+    /// Size of the smallest sub-step [s]; none before the first step.
+    #[serde(default)]
+    pub smallest_dt: Option<f64>,
+    /// End of the first step that has one of that size [s].
+    #[serde(default)]
+    pub smallest_dt_time: Option<f64>,
     /// Newton iterations.
     pub newton_iterations: u64,
     /// Iterations of the linear solver.
@@ -315,6 +373,15 @@ impl Report {
             detection: self.detection.clone(),
             fallbacks: self.fallbacks.clone(),
             choices: self.choices.clone(),
+            refused: self.refused.clone(),
+            untangled: self.untangled.clone(),
+        }
+    }
+
+    /// Notes an attempt that was given up.
+    pub(crate) fn refuse(&mut self, refused: impl FnOnce() -> Refused) {
+        if self.refused.len() < MAX_REFUSED {
+            self.refused.push(refused());
         }
     }
 
@@ -338,6 +405,14 @@ impl Report {
         t.steps += 1;
         t.substeps += u64::from(step.substeps);
         t.retries += u64::from(step.retries);
+        t.rejected += u64::from(step.rejected);
+        t.above_tolerance += u64::from(step.above_tolerance);
+        t.energy_made += step.energy_made;
+        t.largest_dt = t.largest_dt.max(step.dt);
+        t.reduced += u64::from(step.smallest_dt < step.dt);
+        if t.smallest_dt.is_none_or(|dt| step.smallest_dt < dt) {
+            (t.smallest_dt, t.smallest_dt_time) = (Some(step.smallest_dt), Some(step.time));
+        }
         t.newton_iterations += step.newton_iterations as u64;
         t.linear_iterations += step.linear_iterations as u64;
         t.not_converged += u64::from(!step.converged);

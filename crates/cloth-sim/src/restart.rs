@@ -45,7 +45,7 @@ impl Simulation {
         state.x[..x.len()].copy_from_slice(x);
         state.v[..v.len()].copy_from_slice(v);
         state.place_pins(&bodies, &pins);
-        let sim = Self::build(scene, assets, options, Some(state))?;
+        let mut sim = Self::build(scene, assets, options, Some(state))?;
         sim.check_start()?;
         Ok(sim)
     }

@@ -4,13 +4,14 @@ use crate::bodies::{Bodies, ClothBody};
 use crate::contact::ContactStage;
 use crate::device::{Device, SharedGpu};
 use crate::guard::Guard;
+use crate::pace::{Pending, UnderWay};
 use crate::pins::PinSet;
-use crate::scene::Contact;
+use crate::scene::{Contact, Start};
 use crate::sleep::{Rest, Sleeper};
 use crate::step::State;
+use crate::untangle::{Limits, Tangled, untangle};
 use crate::{Assets, BodyInfo, EffectCost, Plan, Report, Scene, SimError, Vec3, plan};
 use cloth_core::{ClothPart, ClothSystem, Energy, Environment, Integrator, IntegratorParams};
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// How to run, as opposed to what.
@@ -37,24 +38,6 @@ impl Default for SimulationOptions {
     }
 }
 
-/// What [`Simulation::advance`] did.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Advance {
-    /// Steps taken.
-    pub steps: usize,
-    /// Whether the caller's check stopped it; [`Simulation::finish_advance`] then does the rest.
-    pub interrupted: bool,
-}
-
-/// What an interrupted advance has left.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Pending {
-    pub(crate) steps: u64,
-    pub(crate) dt: f64,
-    /// Time after the last of them [s].
-    pub(crate) end: f64,
-}
-
 /// A scene being simulated.
 pub struct Simulation {
     pub(crate) scene: Scene,
@@ -70,13 +53,20 @@ pub struct Simulation {
     /// With `effects.sleep`.
     pub(crate) sleeper: Option<Sleeper>,
     pub(crate) inv_mass: Vec<f64>,
+    /// Whether steps are judged by their energy, see [`crate::ledger`].
+    pub(crate) audited: bool,
     pub(crate) state: State,
     pub(crate) pending: Option<Pending>,
+    /// A step of which some parts have been accepted.
+    pub(crate) under_way: Option<UnderWay>,
     pub(crate) plan: Plan,
     pub(crate) report: Report,
     /// Steps (start time, size) that fail on purpose.
     #[cfg(test)]
     pub(crate) fail: fn(f64, f64) -> bool,
+    /// End and size of each attempt that was accepted.
+    #[cfg(test)]
+    pub(crate) accepted: Vec<[f64; 2]>,
 }
 
 impl Simulation {
@@ -87,7 +77,7 @@ impl Simulation {
     /// [`SimError::InvalidArgument`] for a number of threads that is zero or cannot be had; [`SimError::Device`] for a GPU that was
     /// asked for and cannot be had.
     pub fn new(scene: &Scene, assets: Assets, options: SimulationOptions) -> Result<Self, SimError> {
-        let sim = Self::build(scene, assets, options, None)?;
+        let mut sim = Self::build(scene, assets, options, None)?;
         sim.check_start()?;
         Ok(sim)
     }
@@ -171,74 +161,22 @@ impl Simulation {
             integrator,
             contact,
             inv_mass,
+            audited: is_passive(scene),
             state,
             pending: None,
+            under_way: None,
             plan,
             report,
             #[cfg(test)]
             fail: |_, _| false,
+            #[cfg(test)]
+            accepted: Vec::new(),
         };
         sim.sleeper = Sleeper::new(&sim);
         if sim.sleeper.is_some() && sim.state.rest.asleep.len() != sim.bodies.cloth.len() {
             sim.state.rest = Rest::awake(sim.bodies.cloth.len());
         }
         Ok(sim)
-    }
-
-    /// Takes one step of the scene's `time.dt`.
-    ///
-    /// # Errors
-    /// [`SimError::Diverged`], [`SimError::Stuck`]: the step failed at every size tried; [`SimError::Device`]: the GPU that was asked
-    /// for gave no answer. The state is the last good one.
-    pub fn step(&mut self) -> Result<(), SimError> {
-        let dt = self.scene.time.dt;
-        self.step_to(self.state.time + dt, dt)
-    }
-
-    /// Advances by `seconds` in ⌈`seconds`/dt⌉ equal steps. `check` is asked before each; [`ControlFlow::Break`] stops,
-    /// and [`Simulation::finish_advance`] (also after a checkpoint) does the rest with the same steps.
-    ///
-    /// # Errors
-    /// [`SimError::InvalidArgument`] for `seconds` that are negative or not finite; else as [`Simulation::step`].
-    pub fn advance(
-        &mut self,
-        seconds: f64,
-        check: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<Advance, SimError> {
-        /// `seconds` that is a whole number of steps but for rounding makes no extra step.
-        const ROUNDING: f64 = 1e-9;
-        if !(seconds.is_finite() && seconds >= 0.0) {
-            return Err(SimError::InvalidArgument {
-                name: "seconds",
-                expected: "a finite number ≥ 0 [s]",
-                got: seconds.to_string(),
-            });
-        }
-        let steps = (seconds / self.scene.time.dt - ROUNDING).ceil().max(0.0);
-        let end = self.state.time + seconds;
-        self.pending = (steps > 0.0).then(|| Pending { steps: steps as u64, dt: seconds / steps, end });
-        self.finish_advance(check)
-    }
-
-    /// Does what an interrupted [`Simulation::advance`] has left; nothing if there is none.
-    ///
-    /// # Errors
-    /// As [`Simulation::step`].
-    pub fn finish_advance(
-        &mut self,
-        check: &mut dyn FnMut() -> ControlFlow<()>,
-    ) -> Result<Advance, SimError> {
-        let mut steps = 0;
-        while let Some(pending) = self.pending {
-            if check().is_break() {
-                return Ok(Advance { steps, interrupted: true });
-            }
-            let end = if pending.steps == 1 { pending.end } else { self.state.time + pending.dt };
-            self.step_to(end, pending.dt)?;
-            steps += 1;
-            self.pending = (pending.steps > 1).then(|| Pending { steps: pending.steps - 1, ..pending });
-        }
-        Ok(Advance { steps, interrupted: false })
     }
 
     /// Whether an interrupted [`Simulation::advance`] has something left.
@@ -333,29 +271,72 @@ impl Simulation {
         }
     }
 
-    pub(crate) fn check_start(&self) -> Result<(), SimError> {
+    /// Refuses a start state with intersections, or repairs it, as the scene says.
+    pub(crate) fn check_start(&mut self) -> Result<(), SimError> {
+        let Some(contact) = &self.contact else { return Ok(()) };
+        let allow = contact.allow;
+        if self.scene.start == Start::Untangle {
+            return match self.untangle()? {
+                Ok(()) => Ok(()),
+                Err(_) if allow => Ok(()),
+                Err(Tangled { before, left }) => Err(self.tangled(left, Some(before))),
+            };
+        }
+        if allow {
+            return Ok(());
+        }
+        let pairs = self.intersections()?;
+        if pairs.is_empty() { Ok(()) } else { Err(self.tangled(pairs, None)) }
+    }
+
+    /// Moves what passes through each other a little apart, and says so in report and plan.
+    fn untangle(&mut self) -> Result<Result<(), Tangled>, SimError> {
+        /// Farthest that a vertex is moved, of the smallest cloth's size: beyond, no side can be told to be the right one.
+        const REACH: f64 = 0.1;
+        /// Distance left between surfaces: of the thickness, to which contact opens them gently, and at most of an edge.
+        const GAP: [f64; 2] = [0.5, 0.25];
+        /// Way of one pass along the gradient, of an edge.
+        const PACE: f64 = 0.1;
+        let (Some(stage), Some(contact)) = (&self.contact, &self.scene.contact) else { return Ok(Ok(())) };
+        let least = |sizes: &mut dyn Iterator<Item = f64>| sizes.fold(f64::INFINITY, f64::min);
+        let edge = least(&mut self.bodies.cloth.iter().map(ClothBody::median_edge));
+        let size = |body: &ClothBody| body.mesh.bounds().map_or(0.0, |(lo, hi)| (hi - lo).norm());
+        let free: Vec<bool> = self.inv_mass.iter().map(|w| *w > 0.0).collect();
+        let limits = Limits {
+            free: &free,
+            gap: (GAP[0] * contact.thickness).min(GAP[1] * edge),
+            reach: REACH * least(&mut self.bodies.cloth.iter().map(size)),
+            pace: PACE * edge,
+        };
+        let done = untangle(&stage.mesh, &mut self.state.x, &limits, &self.pool)
+            .map_err(|e| crate::contact::stage("untangle", &e))?;
+        let untangled = match done {
+            Ok(untangled) => untangled,
+            Err(tangled) => return Ok(Err(tangled)),
+        };
+        self.plan.note_untangled(&untangled);
+        self.report.untangled = (untangled.pairs > 0).then_some(untangled);
+        Ok(Ok(()))
+    }
+
+    /// The error of pairs of triangles that pass through each other at the start; with those before if some were resolved.
+    fn tangled(&self, pairs: Vec<[u32; 2]>, tangled: Option<usize>) -> SimError {
         /// Pairs listed in an error.
         const LISTED: usize = 64;
         /// Pairs put in words.
         const NAMED: usize = 4;
-        let Some(contact) = &self.contact else { return Ok(()) };
-        if contact.allow {
-            return Ok(());
-        }
-        let pairs = self.intersections()?;
-        if pairs.is_empty() {
-            return Ok(());
-        }
         let names = pairs
             .iter()
             .take(NAMED)
             .map(|p| format!("{} through {}", self.triangle_name(p[0]), self.triangle_name(p[1])))
             .collect();
-        Err(SimError::StartIntersections {
-            count: pairs.len(),
+        let count = pairs.len();
+        SimError::StartIntersections {
+            count,
             pairs: pairs.into_iter().take(LISTED).collect(),
             names,
-        })
+            tangled,
+        }
     }
 
     /// Body and triangle of a global triangle index, in words.
@@ -369,6 +350,13 @@ impl Simulation {
         }
         format!("triangle {triangle}")
     }
+}
+
+/// Whether nothing but pins and colliders can add energy, and the integrator adds none.
+fn is_passive(scene: &Scene) -> bool {
+    let air = &scene.air;
+    let wind = air.wind != [0.0; 3] && (air.damping > 0.0 || air.density * (air.drag + air.lift) > 0.0);
+    !wind && !scene.time.integrator.is_explicit()
 }
 
 /// A cloth as a part of one material, or as its parts.

@@ -1,12 +1,13 @@
 //! One step, stages in reading order.
 //!
 //! Prescribed targets at t + dt → dynamics → response → guard → commit. A step that fails at any stage leaves the state
-//! as it was and is retried with half the size, down to `time.max_halvings` halvings; then the run stops.
+//! as it was; how it is tried again is said in [`crate::pace`].
 
 use crate::bodies::Bodies;
 use crate::constraints::{Holds, failure};
 use crate::contact::{ContactStage, seconds_of_detection, stage};
 use crate::guard::Alarm;
+use crate::pace::Pace;
 use crate::pins::PinSet;
 use crate::report::add_seconds;
 use crate::sleep::Rest;
@@ -27,6 +28,8 @@ pub(crate) struct State {
     pub(crate) contact_force: Vec<Vec3>,
     /// What contact constraints did in the last step; empty in a scene without.
     pub(crate) holds: Holds,
+    /// How large the next attempt is.
+    pub(crate) pace: Pace,
     /// What sleeps; empty in a scene where nothing may.
     pub(crate) rest: Rest,
 }
@@ -58,6 +61,7 @@ impl State {
             v,
             contact_force: Vec::new(),
             holds: Holds::default(),
+            pace: Pace::default(),
             rest: Rest::default(),
         }
     }
@@ -80,6 +84,11 @@ pub(crate) enum Failure {
         pairs: Vec<[u32; 4]>,
         vertices: Vec<u32>,
     },
+    /// Contact made so much energy beyond what there may be [J].
+    Energy {
+        made: f64,
+        level: f64,
+    },
     /// The GPU gave no answer, for this reason.
     Device(String),
     /// Sleeping cloth with these vertices is to wake.
@@ -88,74 +97,94 @@ pub(crate) enum Failure {
     Stop(SimError),
 }
 
-impl Simulation {
-    /// One step of `dt` [s] that ends at `end` [s], in sub-steps if need be.
-    pub(crate) fn step_to(&mut self, end: f64, dt: f64) -> Result<(), SimError> {
-        let started = Instant::now();
-        let t0 = self.state.time;
-        // Sub-steps are counted in units of dt/2^halvings, so that the last one ends exactly at `end`.
-        let whole = 1_u64 << self.scene.time.max_halvings;
-        let fraction = |units: u64| units as f64 / whole as f64;
-        let mut report = StepReport { dt, converged: true, ..StepReport::default() };
-        let (mut done, mut size) = (0, whole);
-        if self.all_rests(end) {
-            self.sleep_through(end, &mut report);
-            done = whole;
+/// The end of a motion that has passed every check and is not written yet.
+pub(crate) struct Trial {
+    pub(crate) state: State,
+    dynamics: StepInfo,
+    /// What response did, and the solves of contact constraints.
+    contact: Option<(ResponseInfo, usize)>,
+    /// What it took [s].
+    seconds: f64,
+}
+
+impl Trial {
+    /// Seconds of continuous detection, and of all.
+    pub(crate) fn seconds(&self) -> [f64; 2] {
+        [self.contact.as_ref().map_or(0.0, |(info, _)| seconds_of_detection(info)), self.seconds]
+    }
+
+    /// Adds the counts of its dynamics to the step's.
+    pub(crate) fn note_work(&self, report: &mut StepReport) {
+        let dynamics = &self.dynamics;
+        report.newton_iterations += dynamics.newton_iterations;
+        report.linear_iterations += dynamics.linear_iterations;
+        report.residual = report.residual.max(dynamics.residual);
+        report.converged &= dynamics.converged;
+    }
+
+    /// Adds its counts to the step's.
+    pub(crate) fn note(&self, report: &mut StepReport) {
+        self.note_work(report);
+        if let Some((info, solves)) = &self.contact {
+            let contact = report.contact.get_or_insert_default();
+            contact.add(info);
+            contact.add_constraints(&self.state.holds, *solves);
         }
-        while done < whole {
-            let t1 = if done + size == whole { end } else { t0 + dt * fraction(done + size) };
-            match self.attempt(t1, dt * fraction(size), &mut report) {
-                Ok(()) => {
-                    done += size;
-                    report.substeps += 1;
-                }
-                Err(Failure::Stop(error)) => return Err(error),
-                Err(Failure::Device(reason)) => self.lose_device(&reason)?,
-                Err(Failure::Wake(vertices)) => self.wake(&vertices)?,
-                Err(_) if size > 1 => {
-                    size /= 2;
-                    report.retries += 1;
-                }
-                Err(Failure::Alarm(Alarm { reason, vertices })) => {
-                    return Err(SimError::Diverged { time: self.state.time, reason, vertices });
-                }
-                Err(Failure::Unresolved { pairs, vertices }) => {
-                    return Err(SimError::Stuck { time: self.state.time, pairs, vertices });
-                }
+    }
+}
+
+/// Whether contact or a strain limit did anything in the step before a state.
+pub(crate) fn touches(state: &State) -> bool {
+    state.contact_force.iter().chain(&state.holds.force).any(|f| *f != Vec3::zeros())
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Alarm(alarm) => write!(f, "diverged: {}", alarm.reason),
+            Self::Unresolved { pairs, .. } => write!(f, "stuck: {} pairs still collide", pairs.len()),
+            Self::Energy { made, level } => {
+                write!(f, "contact made {made:.3e} J of mechanical energy beyond {level:.3e} J")
             }
+            Self::Device(reason) => write!(f, "no answer of the GPU: {reason}"),
+            Self::Wake(vertices) => write!(f, "{} sleeping vertices are to wake", vertices.len()),
+            Self::Stop(error) => error.fmt(f),
         }
-        self.fall_asleep(dt)?;
-        report.asleep = self.state.rest.sleepers();
-        self.state.step += 1;
-        report.step = self.state.step;
-        report.time = self.state.time;
-        if self.contact.as_ref().is_some_and(|c| c.allow) {
-            let clock = Instant::now();
-            report.intersections = Some(self.intersections()?.len());
-            add_seconds(&mut report.seconds, "intersection count", clock.elapsed().as_secs_f64());
-        }
-        self.report.push(report, started.elapsed().as_secs_f64());
-        if let Some(contact) = &self.contact {
-            self.report.grow("contact", contact.bytes());
-            self.report.grow_on_device(contact.continuous.device_bytes());
-        }
-        if let Some(sleeper) = &self.sleeper {
-            self.report.grow("sleep", sleeper.bytes());
-        }
+    }
+}
+
+impl Simulation {
+    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace. Part of a step of `whole` \[s\];
+    /// at `least` \[s\] energy that contact makes is accepted and reported.
+    pub(crate) fn attempt(
+        &mut self,
+        t1: f64,
+        dt: f64,
+        [whole, least]: [f64; 2],
+        report: &mut StepReport,
+    ) -> Result<(), Failure> {
+        let mut trial = self.trial(t1, dt, report)?;
+        let floor = dt <= least || 0.5 * dt < self.scene.time.dt_min;
+        trial.state.pace.ledger = self.audit(&trial.state, whole, floor, report)?;
+        trial.note(report);
+        let seconds = trial.seconds();
+        self.commit(trial.state, seconds);
         Ok(())
     }
 
-    /// Goes on without the GPU that gave no answer, or stops; the state is as before the attempt, which may then be made again.
-    fn lose_device(&mut self, reason: &str) -> Result<(), SimError> {
-        let Some(contact) = &mut self.contact else { return Ok(()) };
-        let fallback = contact.continuous.fall_back(self.state.step + 1, self.state.time, reason)?;
-        self.report.detection = Some(contact.continuous.detection.clone());
-        self.report.fallbacks.push(fallback);
-        Ok(())
+    /// Writes a state that has passed every check; laws with memory move on to it, and contact to the last response.
+    /// `seconds`: of continuous detection, and of all.
+    pub(crate) fn commit(&mut self, state: State, seconds: [f64; 2]) {
+        match self.sleeper.as_mut().and_then(|s| s.awake.as_mut()) {
+            None => self.integrator.accept(),
+            Some(awake) => awake.accept(),
+        }
+        self.state = state;
+        self.accept_contact(seconds);
     }
 
-    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace.
-    pub(crate) fn attempt(&mut self, t1: f64, dt: f64, report: &mut StepReport) -> Result<(), Failure> {
+    /// The motion over `dt` to time `t1` from the state as it is, which stays.
+    pub(crate) fn trial(&mut self, t1: f64, dt: f64, report: &mut StepReport) -> Result<Trial, Failure> {
         #[cfg(test)]
         if (self.fail)(self.state.time, dt) {
             return Err(Failure::Alarm(Alarm { reason: "planted".into(), vertices: vec![0] }));
@@ -169,21 +198,27 @@ impl Simulation {
         self.integrator.set_time(t1);
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
-        let v_free = self.contact.is_some().then(|| v.clone());
-        let mut detection = 0.0;
-        if let Some(info) = self.response(dt, &mut x, &mut v, report)? {
-            self.check(&x, &v, report)?;
-            let contact = report.contact.get_or_insert_default();
-            contact.add(&info);
-            contact.add_constraints(&holds, solves);
-            detection = seconds_of_detection(&info);
-        }
+        let (state, info) = self.meet(t1, dt, x, v, holds, report)?;
+        let seconds = started.elapsed().as_secs_f64();
+        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), seconds })
+    }
 
-        report.newton_iterations += dynamics.newton_iterations;
-        report.linear_iterations += dynamics.linear_iterations;
-        report.residual = report.residual.max(dynamics.residual);
-        report.converged &= dynamics.converged;
-        if let Some(v_free) = v_free {
+    /// The state at `t1` after response to the motion from the state as it is to `x` with end velocities `v`.
+    pub(crate) fn meet(
+        &mut self,
+        t1: f64,
+        dt: f64,
+        mut x: Vec<Vec3>,
+        mut v: Vec<Vec3>,
+        holds: Holds,
+        report: &mut StepReport,
+    ) -> Result<(State, Option<ResponseInfo>), Failure> {
+        let v_free = self.contact.is_some().then(|| v.clone());
+        let info = self.response(dt, &mut x, &mut v, report)?;
+        if info.is_some() {
+            self.check(&x, &v, report)?;
+        }
+        let contact_force = v_free.map_or_else(Vec::new, |v_free| {
             let force = |i: usize| {
                 if self.inv_mass[i] > 0.0 {
                     (v[i] - v_free[i]) / (dt * self.inv_mass[i])
@@ -191,18 +226,10 @@ impl Simulation {
                     self.resting_force(i)
                 }
             };
-            self.state.contact_force = (0..v.len()).map(force).collect();
-        }
-        match self.sleeper.as_mut().and_then(|s| s.awake.as_mut()) {
-            None => self.integrator.accept(),
-            Some(awake) => awake.accept(),
-        }
-        self.state.holds = holds;
-        self.state.x = x;
-        self.state.v = v;
-        self.state.time = t1;
-        self.accept_contact([detection, started.elapsed().as_secs_f64()]);
-        Ok(())
+            (0..v.len()).map(force).collect()
+        });
+        let (step, pace, rest) = (self.state.step, self.state.pace, self.state.rest.clone());
+        Ok((State { time: t1, step, pace, rest, x, v, contact_force, holds }, info))
     }
 
     /// Adds the impulse that contact is expected to give, dt f/m with the force f of the last step.
@@ -236,6 +263,7 @@ impl Simulation {
         pin_v: &[Vec3],
         report: &mut StepReport,
     ) -> Result<(StepInfo, Holds, usize), Failure> {
+        self.integrator.mend_overshoots(!touches(&self.state));
         let constrained = self.constrained_dynamics(dt, x, v, pin_x, pin_v, report)?;
         let (info, holds, solves) = if let Some(done) = constrained {
             done
@@ -333,7 +361,7 @@ impl Simulation {
         (pin_x, pin_v)
     }
 
-    fn check(&self, x: &[Vec3], v: &[Vec3], report: &mut StepReport) -> Result<(), Failure> {
+    pub(crate) fn check(&self, x: &[Vec3], v: &[Vec3], report: &mut StepReport) -> Result<(), Failure> {
         let clock = Instant::now();
         let result = self.guard.check(&self.state.x, x, v).map_err(Failure::Alarm);
         add_seconds(&mut report.seconds, "guard", clock.elapsed().as_secs_f64());
@@ -360,203 +388,4 @@ fn response_failure(error: ResponseError, asleep: &[bool]) -> Failure {
 }
 
 #[cfg(test)]
-mod tests {
-    use crate::{Assets, Scene, SimError, Simulation, SimulationOptions};
-
-    const SCENE: &str = r#"
-duration = 1.0
-[time]
-dt = 0.01
-max_halvings = 3
-[[cloth]]
-name = "cloth"
-mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 6, ny = 6 }
-material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 50.0 } }
-pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = [0.0, 1.0, 0.0] }] }]
-"#;
-
-    fn simulation() -> Simulation {
-        let scene = Scene::parse_toml(SCENE, "test.toml").unwrap();
-        let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
-        Simulation::new(&scene, Assets::default(), options).unwrap()
-    }
-
-    #[test]
-    fn a_retry_leaves_no_trace() {
-        let mut retried = simulation();
-        retried.fail = |time, dt| time < 0.005 && dt > 0.006;
-        retried.step().unwrap();
-        assert_eq!((retried.report.steps[0].retries, retried.report.steps[0].substeps), (1, 2));
-        let mut straight = simulation();
-        straight.step_to(0.005, 0.005).unwrap();
-        straight.step_to(0.01, 0.005).unwrap();
-        assert_eq!(retried.state.x, straight.state.x);
-        assert_eq!(retried.state.v, straight.state.v);
-        assert_eq!((retried.state.time, retried.state.step), (0.01, 1));
-        let mut whole = simulation();
-        whole.step().unwrap();
-        assert_ne!(retried.state.x, whole.state.x, "the comparison sees a difference");
-    }
-
-    /// The scene with a law that remembers, folded far enough by its pin for friction to be overcome.
-    fn remembering() -> Simulation {
-        let text = SCENE.replace(
-            "in_plane = { model = \"spring\", stiffness = 50.0 } }",
-            "in_plane = { model = \"spring\", stiffness = 50.0 }, \
-             bending = { model = \"hysteresis\", b1 = 2e-3, b2 = 1e-3, c1 = -5e-3, plasticity = 0.3, fatigue = 0.1 } }",
-        );
-        let scene = Scene::parse_toml(&text, "test.toml").unwrap();
-        let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
-        Simulation::new(&scene, Assets::default(), options).unwrap()
-    }
-
-    #[test]
-    fn history_is_committed_once_per_accepted_step() {
-        let mut retried = remembering();
-        assert!(retried.integrator.system().remembers());
-        // Both halves of the first attempt at full size fail, and so does one at half size.
-        retried.fail = |time, dt| (time < 0.005 && dt > 0.006) || (time < 0.03 && time > 0.015 && dt > 0.003);
-        for _ in 0..5 {
-            retried.step().unwrap();
-        }
-        let retries: u32 = retried.report.steps.iter().map(|s| s.retries).sum();
-        assert!(retries >= 2, "{retries}");
-        let mut straight = remembering();
-        for step in &retried.report.steps {
-            // The sizes that were accepted, one after the other.
-            let (start, substeps) = (straight.time(), step.substeps);
-            for k in 1..=substeps {
-                let end = if k == substeps {
-                    step.time
-                } else {
-                    start + step.dt * f64::from(k) / f64::from(substeps)
-                };
-                straight.step_to(end, step.dt / f64::from(substeps)).unwrap();
-            }
-        }
-        let memory = retried.memory();
-        assert_eq!(memory, straight.memory());
-        assert_eq!(retried.state.x, straight.state.x);
-        let mut whole = remembering();
-        for _ in 0..5 {
-            whole.step().unwrap();
-        }
-        assert_ne!(memory, whole.memory(), "the comparison sees a difference");
-        assert!(memory.iter().any(|m| *m != 0.0));
-    }
-
-    #[test]
-    fn history_survives_a_checkpoint_to_the_same_bits() {
-        let mut sim = remembering();
-        for _ in 0..30 {
-            sim.step().unwrap();
-        }
-        let mut resumed = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
-        assert_eq!(resumed.hinges(), sim.hinges());
-        let mut forgetful = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
-        let nothing = remembering().memory();
-        forgetful.integrator.set_memory(&nothing).unwrap();
-        for _ in 0..30 {
-            for sim in [&mut sim, &mut resumed, &mut forgetful] {
-                sim.step().unwrap();
-            }
-        }
-        assert_eq!(resumed.state, sim.state);
-        assert_eq!(resumed.hinges(), sim.hinges());
-        assert_ne!(forgetful.state.x, sim.state.x, "memory that is lost is seen");
-        assert!(sim.hinges().iter().any(|h| h.place.rest_curvature != 0.0), "some bend has stayed");
-    }
-
-    #[test]
-    fn a_step_that_fails_at_every_size_keeps_the_last_good_state() {
-        let mut sim = simulation();
-        sim.step().unwrap();
-        let good = sim.state.clone();
-        sim.fail = |_, _| true;
-        let error = sim.step().unwrap_err();
-        assert_eq!(error, SimError::Diverged { time: 0.01, reason: "planted".into(), vertices: vec![0] });
-        assert_eq!(sim.state, good);
-        assert_eq!(sim.report.steps.len(), 1);
-        sim.fail = |_, _| false;
-        sim.step().unwrap();
-        let mut straight = simulation();
-        straight.step().unwrap();
-        straight.step().unwrap();
-        assert_eq!(sim.state, straight.state);
-    }
-
-    /// A card that slides down a slope, held by contact constraints.
-    fn sliding() -> Simulation {
-        let text = r#"
-duration = 1.0
-[time]
-dt = 0.01
-[contact]
-method = "constraints"
-thickness = 0.01
-friction = { law = "coulomb-stiction", mu_c = 0.1, mu_s = 0.2 }
-[[cloth]]
-name = "card"
-mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 6, ny = 6 }
-material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 50.0 } }
-position = [-0.003, 0.01, 0.0]
-rotation = { axis = [0, 0, 1], angle = 0.3 }
-[[collider]]
-name = "slope"
-shape = { type = "plane", half_size = 3.0 }
-rotation = { axis = [0, 0, 1], angle = 0.3 }
-"#;
-        let scene = Scene::parse_toml(text, "test.toml").unwrap();
-        let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
-        Simulation::new(&scene, Assets::default(), options).unwrap()
-    }
-
-    #[test]
-    fn a_retry_leaves_no_trace_in_contact_constraints() {
-        let mut retried = sliding();
-        retried.step().unwrap();
-        // An attempt that the guard gives up, after a search of its own.
-        let good = retried.state.clone();
-        retried.state.v[7].x = 1e6;
-        let before = retried.state.clone();
-        assert!(retried.attempt(0.02, 0.01, &mut crate::StepReport::default()).is_err());
-        assert_eq!(retried.state, before);
-        retried.state = good;
-        retried.fail = |time, dt| time < 0.015 && dt > 0.006;
-        retried.step().unwrap();
-        let mut straight = sliding();
-        for [end, dt] in [[0.01, 0.01], [0.015, 0.005], [0.02, 0.005]] {
-            straight.step_to(end, dt).unwrap();
-        }
-        let state = |sim: &Simulation| (sim.state.x.clone(), sim.state.v.clone(), sim.state.holds.clone());
-        assert!(state(&retried) == state(&straight));
-        assert!(retried.state.holds.sliding.iter().any(|s| *s));
-        let mut whole = sliding();
-        whole.step().unwrap();
-        whole.step().unwrap();
-        assert!(state(&retried) != state(&whole), "the comparison sees a difference");
-        // What is not a number comes out as an alarm that names vertices, and the state stays.
-        let good = retried.state.clone();
-        retried.fail = |_, _| false;
-        retried.state.v[7].x = f64::NAN;
-        let SimError::Diverged { vertices, .. } = retried.step().unwrap_err() else { panic!("diverged") };
-        assert!(!vertices.is_empty());
-        assert_eq!(retried.state.x, good.x);
-    }
-
-    #[test]
-    fn sub_steps_that_succeed_before_one_that_fails_are_kept() {
-        let mut sim = simulation();
-        sim.fail = |time, dt| dt > 0.006 || time > 0.004;
-        let SimError::Diverged { time, .. } = sim.step().unwrap_err() else { panic!("diverged") };
-        assert_eq!(time, 0.005);
-        assert_eq!(sim.time(), 0.005);
-    }
-
-    #[test]
-    fn a_scene_without_contact_builds_none() {
-        let sim = simulation();
-        assert!(sim.contact.is_none());
-        assert!(sim.plan.running().all(|name| !name.contains("contact") && name != "friction"));
-    }
-}
+mod tests;

@@ -128,7 +128,7 @@ fn a_start_with_intersections_is_refused_with_count_and_pairs() {
     let options = SimulationOptions::default();
     let error = Simulation::new(&scene(&crossing()), Assets::default(), options).err().expect("refused");
     let text = error.to_string();
-    let SimError::StartIntersections { count, pairs, names } = error else { panic!("{text}") };
+    let SimError::StartIntersections { count, pairs, names, .. } = error else { panic!("{text}") };
     assert!(count > 2 && pairs.len() == count.min(64));
     assert!(pairs.iter().all(|p| p[0] < 128 && p[1] >= 128), "one triangle of each sheet: {pairs:?}");
     assert!(names[0].contains("of \"flat\" through triangle") && text.contains(&names[0]), "{text}");

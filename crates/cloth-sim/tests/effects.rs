@@ -62,7 +62,7 @@ fn a_drape_is_the_same_bits_with_auto() {
 #[test]
 fn a_crumpling_sheet_is_the_same_bits_with_auto() {
     let [_, flat, collisions] = compare(&crumple(19), 130);
-    assert!(flat > 0 && collisions > 100, "{flat} {collisions}");
+    assert!(flat > 0 && collisions > 20, "{flat} {collisions}");
 }
 
 /// A card on a slope of `angle` [rad], heavily damped, with a law of friction.

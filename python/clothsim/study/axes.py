@@ -23,6 +23,7 @@ __all__ = ["NAMED", "RUN_AXES", "Axis", "apply", "axis", "axis_kind", "parse", "
 # Names for keys of a scene that studies vary most.
 _KEYS = {
     "dt": "time.dt",
+    "dt_tolerance": "time.dt_tolerance",
     "integrator": "time.integrator",
     "bending_substeps": "time.bending_substeps",
     "newton_tolerance": "time.newton_tolerance",
@@ -49,7 +50,9 @@ NAMED = {**_KEYS, **_OTHER}
 # Tables and keys of a scene at the top level, where a path may begin.
 _ROOTS = ("time", "solver", "air", "contact", "cloth", "collider", "output", "gravity", "duration")
 # Smaller is finer, or larger is; these do not change what the exact answer is.
-_REFINES = {"time.dt": -1, "solver.tolerance": -1, "time.newton_tolerance": -1, "resolution": 1}
+_REFINES = {
+    "time.dt": -1, "time.dt_tolerance": -1, "solver.tolerance": -1, "time.newton_tolerance": -1, "resolution": 1,
+}  # fmt: skip
 _NUMERIC_ONLY = {
     *_REFINES,
     "time.integrator",
@@ -57,6 +60,8 @@ _NUMERIC_ONLY = {
     "time.bending_substeps",
     "time.newton_max_iterations",
     "time.max_halvings",
+    "time.dt_min",
+    "time.dt_max",
     "solver.method",
     "solver.max_iterations",
     "contact.detector",
@@ -223,6 +228,8 @@ def value_text(value: Any) -> str:
 
 
 def _size(value: Any) -> float:
+    if value == "auto":
+        return math.inf  # of a step: as large as its error allows
     if isinstance(value, str) and re.fullmatch(r"[0-9.]+x", value):
         return float(value[:-1])
     try:

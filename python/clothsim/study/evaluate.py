@@ -47,7 +47,12 @@ def row(settings: Settings, runs: Sequence[Run], metrics: Sequence[Metric], refe
     for run in runs:
         for key, n in run.facts["totals"].items():
             if n is not None and key != "wall_seconds":
-                totals[key] = max(totals.get(key, 0), n) if key.startswith("max") else totals.get(key, 0) + n
+                if key.startswith(("max", "largest")):
+                    totals[key] = max(totals.get(key, 0), n)
+                elif key.startswith("smallest"):
+                    totals[key] = min(totals.get(key, n), n)
+                else:
+                    totals[key] = totals.get(key, 0) + n
     if totals.get("retries"):
         notes.append(f"steps retried with a smaller one: {totals['retries']}")
     if totals.get("not_converged"):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from clothsim.errors import ClothSimError
+from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.study.axes import Axis, axis
 from clothsim.study.closed_forms import ClosedForm
 from clothsim.study.metrics import Metric
@@ -119,7 +119,8 @@ def _candidates(runner: Runner, problem: Settings, axes: Sequence[Axis]) -> list
     """Settings of references, best first, each with those that lack one refinement, by axis."""
     all_axes = list(axes)
     if not any(a.refines for a in axes):
-        step = axis("dt", [runner.base["time"]["dt"]])
+        time = runner.base["time"]
+        step = axis("dt_tolerance", [time["dt_tolerance"]]) if time["dt"] == "auto" else axis("dt", [time["dt"]])
         all_axes.append(step)
         runner.axes = [a for a in runner.axes if a.key != step.key] + [step]
     chosen: list[tuple[Settings, dict[str, Settings]]] = []
@@ -167,6 +168,8 @@ def _usual(runner: Runner, a: Axis) -> Any:
 def _finer(runner: Runner, a: Axis, finest: Settings) -> Any:
     if a.key == "resolution":
         return refined(runner.built(finest).data)
+    if finest[a.name] == "auto":
+        raise InvalidInput(f'{a.name}: expected a number to refine, got "auto"', name=a.name, got="auto")
     value = float(finest[a.name])
     return _FINER_STEP * value if a.key == "time.dt" else max(_FINER_TOLERANCE * value, _FLOOR)
 

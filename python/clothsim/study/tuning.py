@@ -182,7 +182,8 @@ def _axes(base: dict[str, Any], vary: Sequence[Axis]) -> list[Axis]:
         others = [i for i in _INTEGRATORS if i != own and (i.startswith("implicit") or not held)]
         axes.insert(0, axis("integrator", [own, *others]))
     if "time.dt" not in keys:
-        dt, most = float(base["time"]["dt"]), float(base["duration"])
+        own_dt, most = base["time"]["dt"], float(base["duration"])
+        dt = float(base["time"]["dt_max"] if own_dt == "auto" else own_dt)
         steps = [dt * _COARSEST / 2**k for k in range(_LEVELS)]
         axes.append(axis("dt", [s for s in steps if s <= most]))
     return axes

@@ -30,6 +30,8 @@ __all__ = ["pack_scene", "run_job"]
 LATE = 0.75
 # A timed run was disturbed if it took this many times its processor time and a reading of the clock [s].
 _WAITED, _CLOCK = 1.05, 1e-4
+# Pieces in which a run under error control is observed.
+_PIECES = 200
 # Runs at most, in place of disturbed ones too, over the repeats asked for.
 _TRIES = 2
 
@@ -57,9 +59,12 @@ def run_job(job: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     depends, and cloth in contact on that. Timed runs during which the core was given to something else are repeated.
     """
     data = job["data"]
-    duration, dt = float(data["duration"]), float(data["time"]["dt"])
-    steps = max(1, int(np.ceil(duration / dt - 1e-9)))
-    data["time"]["dt"] = duration / steps
+    duration, dt = float(data["duration"]), data["time"]["dt"]
+    if dt == "auto":
+        steps = _PIECES
+    else:
+        steps = max(1, int(np.ceil(duration / float(dt) - 1e-9)))
+        data["time"]["dt"] = duration / steps
     scene = _unpack(Path(job["scene"]), data)
     threads, device = job["threads"], job["device"]
     if job["seed"] is not None:

@@ -350,7 +350,7 @@ impl Workspace {
     ) -> Result<SolveInfo, StepError> {
         held.projection.project(&mut self.matrix, &held.freedoms);
         let Prescribed { pins, .. } = *pins;
-        let solved = self.solve(params, &Prescribed { pins, pinned: &held.pinned });
+        let solved = self.solve(params, &Prescribed { pins, pinned: &held.pinned, mends: false });
         held.projection.restore(&mut self.matrix);
         held.project(&mut self.dv);
         solved

@@ -22,7 +22,7 @@ pub(super) struct Workspace {
     pub(super) b: Vec<Vec3>,
     pub(super) dv: Vec<Vec3>,
     pub(super) clock: Clock,
-    /// Trial state of Newton's method.
+    /// Trial state of Newton's method; none before its first step.
     pub(super) x: Vec<Vec3>,
     pub(super) v: Vec<Vec3>,
     pub(super) residual: Vec<Vec3>,
@@ -69,6 +69,13 @@ impl Workspace {
             v: trial(),
             residual: trial(),
             held: None,
+        }
+    }
+
+    /// Makes room for trial states of Newton's method.
+    pub(super) fn hold_trials(&mut self, count: usize) {
+        for list in [&mut self.x, &mut self.v, &mut self.residual] {
+            list.resize(count, Vec3::zeros());
         }
     }
 

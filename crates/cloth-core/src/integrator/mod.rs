@@ -6,6 +6,7 @@ mod implicit;
 mod implicit_euler;
 mod line_search;
 mod newton;
+mod overshoot;
 mod semi_implicit;
 mod stability;
 
@@ -96,7 +97,7 @@ pub struct Pins<'a> {
 /// What happened in a step.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepInfo {
-    /// Newton iterations (1 for the linearised scheme, 0 for explicit ones).
+    /// Newton iterations (0 for explicit schemes; the linearised one has 1, more where [`Integrator::mend_overshoots`] did).
     pub newton_iterations: usize,
     /// Iterations of the linear solver, summed (0 for a direct solver).
     pub linear_iterations: usize,
@@ -122,6 +123,8 @@ pub struct Integrator {
     /// Which vertices are pinned in the step under way; all false between steps.
     pinned: Vec<bool>,
     work: Work,
+    /// Whether linearised steps that would make energy are solved to their end.
+    mends: bool,
 }
 
 /// Work space of the scheme in use.
@@ -172,7 +175,14 @@ impl Integrator {
             }
         };
         let pinned = vec![false; system.vertex_count()];
-        Ok(Self { system, params, pool, pinned, work })
+        Ok(Self { system, params, pool, pinned, work, mends: false })
+    }
+
+    /// Whether a linearised step that would make energy is solved by Newton's method instead; off at first.
+    ///
+    /// Not for steps with impulses of contact in their velocities: what these make of single vertices is no motion of the cloth.
+    pub fn mend_overshoots(&mut self, on: bool) {
+        self.mends = on;
     }
 
     /// The system that is stepped.
@@ -262,12 +272,12 @@ impl Integrator {
             self.pinned[vertex as usize] = true;
         }
         let (x, v) = (&mut x[..n], &mut v[..n]);
-        let Self { system, params, pool, pinned, work } = self;
+        let Self { system, params, pool, pinned, work, mends } = self;
         if params.method != Method::ImplicitEuler {
             // That one moves memory on as it linearises at x, in one pass.
             pool.install(|| system.settle(x));
         }
-        let prescribed = Prescribed { pins, pinned };
+        let prescribed = Prescribed { pins, pinned, mends: *mends };
         let result = pool.install(|| match work {
             Work::Explicit(buffers) => Ok(buffers.step(system, params.method, x, v, dt, &prescribed)),
             Work::Implicit(work) => {
@@ -333,6 +343,8 @@ impl Pins<'_> {
 struct Prescribed<'a> {
     pins: &'a Pins<'a>,
     pinned: &'a [bool],
+    /// See [`Integrator::mend_overshoots`].
+    mends: bool,
 }
 
 impl Prescribed<'_> {

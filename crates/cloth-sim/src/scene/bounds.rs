@@ -23,7 +23,7 @@ struct Bound {
 
 /// The first row that has a key counts; what is in none is bounded by [`OTHER`].
 #[rustfmt::skip]
-const BOUNDS: [Bound; 20] = [
+const BOUNDS: [Bound; 21] = [
     // A region without end on one side is a way to say "all above".
     Bound { keys: &["box.min", "box.max"], least: 0.0, largest: f64::MAX, unit: " m", why: "" },
     Bound { keys: &["cloth.warp", "axis"], least: 1e-100, largest: 1e100, unit: "", why: "the square of its length is to be a number" },
@@ -47,7 +47,8 @@ const BOUNDS: [Bound; 20] = [
     Bound { keys: &["friction", "self_friction", "mu_c", "mu_s", "drag", "lift"], least: 0.0, largest: 1e6, unit: "", why: "nothing has a coefficient above 100" },
     Bound { keys: &["v_s"], least: 1e-12, largest: VELOCITY, unit: " m/s", why: "far below a creep to faster than all that falls from space" },
     Bound { keys: &["strain_limit", "stretch"], least: 1e-9, largest: 1e6, unit: "", why: "less is rounding, more is no limit" },
-    Bound { keys: &["time.dt"], least: 1e-12, largest: 1e6, unit: " s", why: "far below and above any step that resolves cloth" },
+    Bound { keys: &["dt_tolerance"], least: 1e-12, largest: LENGTH, unit: " m", why: "far below an atom's breadth is rounding" },
+    Bound { keys: &["time.dt", "dt_min", "dt_max"], least: 1e-12, largest: 1e6, unit: " s", why: "far below and above any step that resolves cloth" },
     Bound { keys: &["duration", "keyframes.time", "start"], least: 0.0, largest: 1e9, unit: " s", why: "30 years" },
     Bound { keys: &["fps"], least: 1e-9, largest: 1e12, unit: " 1/s", why: "far below and above any frame rate" },
     Bound { keys: &["angle", "twist"], least: 0.0, largest: 1e9, unit: " rad", why: "more turns are not resolved" },

@@ -13,7 +13,7 @@ impl Scene {
             self.finite("gravity", &g, "m/s²")?;
         }
         self.positive("duration", self.duration, "s")?;
-        self.positive("time.dt", self.time.dt, "s")?;
+        self.check_steps()?;
         self.positive("time.newton_tolerance", self.time.newton_tolerance, "")?;
         self.at_least_one("time.newton_max_iterations", self.time.newton_max_iterations)?;
         self.at_least_one("time.bending_substeps", self.time.bending_substeps)?;
@@ -45,6 +45,21 @@ impl Scene {
             self.check_collider(collider, &format!("collider[{i}]"))?;
         }
         self.check_sizes()
+    }
+
+    fn check_steps(&self) -> Result<(), SceneError> {
+        let time = &self.time;
+        if let Some(dt) = time.fixed() {
+            self.positive("time.dt", dt, "s")?;
+        }
+        self.positive("time.dt_tolerance", time.dt_tolerance, "m")?;
+        self.positive("time.dt_max", time.dt_max, "s")?;
+        self.positive("time.dt_min", time.dt_min, "s")?;
+        if time.fixed().is_none() && time.dt_min > time.dt_max {
+            let expected = format!("at most time.dt_max = {} s", time.dt_max);
+            return Err(self.error("time.dt_min", expected, time.dt_min.to_string()));
+        }
+        Ok(())
     }
 
     fn check_contact(&self) -> Result<(), SceneError> {

@@ -29,13 +29,24 @@ pub use garment::{Region, Seam};
 pub use motion::{Keyframe, Rotation};
 pub use output::Output;
 pub use source::{SceneError, nearest};
-pub use world::{Air, Contact, ContactMethod, Time, Up};
+pub use world::{Air, AutoStep, Contact, ContactMethod, Time, TimeStep, Up};
 
 pub(crate) use bounds::{LENGTH, VELOCITY};
 use cloth_core::SolverParams;
 use serde::{Deserialize, Serialize};
 use source::Source;
 use std::sync::Arc;
+
+/// What is done about a start state whose surfaces pass through each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// It is refused with the number of pairs, unless `contact.allow_intersections` is set.
+    #[default]
+    AsGiven,
+    /// Small penetrations are repaired and listed in the report; what is left is refused.
+    Untangle,
+}
 
 /// A scene: what there is, how it moves, how it is stepped and what is written.
 #[derive(Debug, Clone, Serialize, Deserialize, schemars::JsonSchema)]
@@ -55,6 +66,9 @@ pub struct Scene {
     /// Time step and integrator.
     #[serde(default)]
     pub time: Time,
+    /// What is done about a start state whose surfaces pass through each other: "as-given" or "untangle".
+    #[serde(default)]
+    pub start: Start,
     /// Linear solver of the implicit integrators.
     #[serde(default)]
     pub solver: SolverParams,

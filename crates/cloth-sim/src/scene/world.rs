@@ -15,12 +15,35 @@ pub enum Up {
     Z,
 }
 
+/// Size of the time step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(untagged)]
+pub enum TimeStep {
+    /// So long [s], > 0: a run divides each frame into equal steps of at most this.
+    Seconds(f64),
+    /// As long as its estimated error allows, see `dt_tolerance`.
+    Auto(AutoStep),
+}
+
+/// The step is chosen by its error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum AutoStep {
+    /// The only choice.
+    Auto,
+}
+
 /// Time step and integrator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Time {
-    /// Largest time step [s], > 0. A run divides each frame into equal steps of at most this.
-    pub dt: f64,
+    /// Largest time step [s], > 0: a run divides each frame into equal steps of at most this. Or "auto": as large as
+    /// `dt_tolerance` allows.
+    pub dt: TimeStep,
+    /// Error of the positions that `dt = "auto"` aims at [m], > 0: no step may add more than a tenth of it at any cloth vertex.
+    pub dt_tolerance: f64,
+    /// Largest step of `dt = "auto"` [s], > 0.
+    pub dt_max: f64,
     /// Integration scheme.
     pub integrator: Method,
     /// What the implicit schemes do about indefinite element matrices.
@@ -31,21 +54,41 @@ pub struct Time {
     pub newton_max_iterations: usize,
     /// α: explicit sub-steps for bending in one step (`semi-implicit`), ≥ 1.
     pub bending_substeps: usize,
-    /// How often a step that fails is halved before the run stops.
+    /// How often a step that fails is halved before the run stops, 0 to 16; it grows back after some that succeed.
     pub max_halvings: u32,
+    /// Floor of the size of a step that fails, or of one of `dt = "auto"` [s], > 0: none is made smaller.
+    pub dt_min: f64,
+}
+
+impl Time {
+    /// The size of steps [s]; none where their error decides.
+    pub fn fixed(&self) -> Option<f64> {
+        match self.dt {
+            TimeStep::Seconds(dt) => Some(dt),
+            TimeStep::Auto(_) => None,
+        }
+    }
+
+    /// Largest step [s].
+    pub fn largest(&self) -> f64 {
+        self.fixed().unwrap_or(self.dt_max)
+    }
 }
 
 impl Default for Time {
     fn default() -> Self {
         let core = IntegratorParams::default();
         Self {
-            dt: 0.005,
+            dt: TimeStep::Seconds(0.005),
+            dt_tolerance: 1e-3,
+            dt_max: 0.04,
             integrator: core.method,
             indefinite: core.psd,
             newton_tolerance: core.newton_tolerance,
             newton_max_iterations: core.newton_max_iterations,
             bending_substeps: core.bending_substeps,
             max_halvings: 6,
+            dt_min: 1e-9,
         }
     }
 }

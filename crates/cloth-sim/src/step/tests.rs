@@ -1,0 +1,374 @@
+//! A step that fails, and what it leaves.
+
+use crate::{Assets, Scene, SimError, Simulation, SimulationOptions};
+use std::ops::ControlFlow;
+
+const SCENE: &str = r#"
+duration = 1.0
+[time]
+dt = 0.01
+max_halvings = 3
+[[cloth]]
+name = "cloth"
+mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 6, ny = 6 }
+material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 50.0 } }
+pins = [{ vertices = [0], keyframes = [{ time = 0.0 }, { time = 1.0, position = [0.0, 1.0, 0.0] }] }]
+"#;
+
+fn simulation() -> Simulation {
+    let scene = Scene::parse_toml(SCENE, "test.toml").unwrap();
+    let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+    Simulation::new(&scene, Assets::default(), options).unwrap()
+}
+
+#[test]
+fn a_retry_leaves_no_trace() {
+    let mut retried = simulation();
+    retried.fail = |time, dt| time < 0.005 && dt > 0.006;
+    retried.step().unwrap();
+    assert_eq!((retried.report.steps[0].retries, retried.report.steps[0].substeps), (1, 2));
+    let mut straight = simulation();
+    straight.step_to(0.005, 0.005).unwrap();
+    straight.step_to(0.01, 0.005).unwrap();
+    assert_eq!(retried.state.x, straight.state.x);
+    assert_eq!(retried.state.v, straight.state.v);
+    assert_eq!((retried.state.time, retried.state.step), (0.01, 1));
+    let mut whole = simulation();
+    whole.step().unwrap();
+    assert_ne!(retried.state.x, whole.state.x, "the comparison sees a difference");
+}
+
+/// The scene with a law that remembers, folded far enough by its pin for friction to be overcome.
+fn remembering() -> Simulation {
+    let text = SCENE.replace(
+        "in_plane = { model = \"spring\", stiffness = 50.0 } }",
+        "in_plane = { model = \"spring\", stiffness = 50.0 }, \
+         bending = { model = \"hysteresis\", b1 = 2e-3, b2 = 1e-3, c1 = -5e-3, plasticity = 0.3, fatigue = 0.1 } }",
+    );
+    let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+    let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+    Simulation::new(&scene, Assets::default(), options).unwrap()
+}
+
+#[test]
+fn history_is_committed_once_per_accepted_step() {
+    let mut retried = remembering();
+    assert!(retried.integrator.system().remembers());
+    // Both halves of the first attempt at full size fail, and so does one at half size.
+    retried.fail = |time, dt| (time < 0.005 && dt > 0.006) || (time < 0.03 && time > 0.015 && dt > 0.003);
+    for _ in 0..5 {
+        retried.step().unwrap();
+    }
+    let retries: u32 = retried.report.steps.iter().map(|s| s.retries).sum();
+    assert!(retries >= 2, "{retries}");
+    let mut straight = remembering();
+    for &[end, dt] in &retried.accepted {
+        straight.step_to(end, dt).unwrap();
+    }
+    let memory = retried.memory();
+    assert_eq!(memory, straight.memory());
+    assert_eq!(retried.state.x, straight.state.x);
+    let mut whole = remembering();
+    for _ in 0..5 {
+        whole.step().unwrap();
+    }
+    assert_ne!(memory, whole.memory(), "the comparison sees a difference");
+    assert!(memory.iter().any(|m| *m != 0.0));
+}
+
+#[test]
+fn history_survives_a_checkpoint_to_the_same_bits() {
+    let mut sim = remembering();
+    for _ in 0..30 {
+        sim.step().unwrap();
+    }
+    let mut resumed = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
+    assert_eq!(resumed.hinges(), sim.hinges());
+    let mut forgetful = Simulation::resume(&sim.checkpoint(), Some(2)).unwrap();
+    let nothing = remembering().memory();
+    forgetful.integrator.set_memory(&nothing).unwrap();
+    for _ in 0..30 {
+        for sim in [&mut sim, &mut resumed, &mut forgetful] {
+            sim.step().unwrap();
+        }
+    }
+    assert_eq!(resumed.state, sim.state);
+    assert_eq!(resumed.hinges(), sim.hinges());
+    assert_ne!(forgetful.state.x, sim.state.x, "memory that is lost is seen");
+    assert!(sim.hinges().iter().any(|h| h.place.rest_curvature != 0.0), "some bend has stayed");
+}
+
+#[test]
+fn a_step_that_fails_at_every_size_keeps_the_last_good_state() {
+    let mut sim = simulation();
+    sim.step().unwrap();
+    let good = sim.state.clone();
+    sim.fail = |_, _| true;
+    let error = sim.step().unwrap_err();
+    assert_eq!(error, SimError::Diverged { time: 0.01, reason: "planted".into(), vertices: vec![0] });
+    assert_eq!(sim.state, good);
+    assert_eq!(sim.report.steps.len(), 1);
+    sim.fail = |_, _| false;
+    sim.step().unwrap();
+    let mut straight = simulation();
+    straight.step().unwrap();
+    straight.step().unwrap();
+    assert_eq!(sim.state, straight.state);
+}
+
+/// A card that slides down a slope, held by contact constraints.
+fn sliding() -> Simulation {
+    let text = r#"
+duration = 1.0
+[time]
+dt = 0.01
+[contact]
+method = "constraints"
+thickness = 0.01
+friction = { law = "coulomb-stiction", mu_c = 0.1, mu_s = 0.2 }
+[[cloth]]
+name = "card"
+mesh = { generator = "grid", width = 1.0, height = 1.0, nx = 6, ny = 6 }
+material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 50.0 } }
+position = [-0.003, 0.01, 0.0]
+rotation = { axis = [0, 0, 1], angle = 0.3 }
+[[collider]]
+name = "slope"
+shape = { type = "plane", half_size = 3.0 }
+rotation = { axis = [0, 0, 1], angle = 0.3 }
+"#;
+    let scene = Scene::parse_toml(text, "test.toml").unwrap();
+    let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+    Simulation::new(&scene, Assets::default(), options).unwrap()
+}
+
+#[test]
+fn a_retry_leaves_no_trace_in_contact_constraints() {
+    let mut retried = sliding();
+    retried.step().unwrap();
+    // An attempt that the guard gives up, after a search of its own.
+    let good = retried.state.clone();
+    retried.state.v[7].x = 1e6;
+    let before = retried.state.clone();
+    assert!(retried.attempt(0.02, 0.01, [0.01, 0.0], &mut crate::StepReport::default()).is_err());
+    assert_eq!(retried.state, before);
+    retried.state = good;
+    retried.fail = |time, dt| time < 0.015 && dt > 0.006;
+    retried.step().unwrap();
+    let mut straight = sliding();
+    for [end, dt] in [[0.01, 0.01], [0.015, 0.005], [0.02, 0.005]] {
+        straight.step_to(end, dt).unwrap();
+    }
+    let state = |sim: &Simulation| (sim.state.x.clone(), sim.state.v.clone(), sim.state.holds.clone());
+    assert!(state(&retried) == state(&straight));
+    assert!(retried.state.holds.sliding.iter().any(|s| *s));
+    let mut whole = sliding();
+    whole.step().unwrap();
+    whole.step().unwrap();
+    assert!(state(&retried) != state(&whole), "the comparison sees a difference");
+    // What is not a number comes out as an alarm that names vertices, and the state stays.
+    let good = retried.state.clone();
+    retried.fail = |_, _| false;
+    retried.state.v[7].x = f64::NAN;
+    let SimError::Diverged { vertices, .. } = retried.step().unwrap_err() else { panic!("diverged") };
+    assert!(!vertices.is_empty());
+    assert_eq!(retried.state.x, good.x);
+}
+
+#[test]
+fn sub_steps_that_succeed_before_one_that_fails_are_kept() {
+    let mut sim = simulation();
+    sim.fail = |time, dt| dt > 0.006 || time > 0.004;
+    let SimError::Diverged { time, .. } = sim.step().unwrap_err() else { panic!("diverged") };
+    assert_eq!(time, 0.005);
+    assert_eq!(sim.time(), 0.005);
+    // The step is taken up where it stands, and ends where it would have.
+    sim.fail = |_, _| false;
+    sim.step().unwrap();
+    assert_eq!((sim.state.time, sim.state.step), (0.01, 1));
+    assert_eq!(sim.accepted, [[0.005, 0.005], [0.01, 0.005]]);
+}
+
+/// The scene for two steps that fail above a quarter of the size from 5 ms to 15 ms.
+fn reduced(mut sim: Simulation) -> Simulation {
+    sim.fail = |time, dt| (0.004..0.015).contains(&time) && dt > 0.003;
+    sim
+}
+
+#[test]
+fn a_size_is_halved_at_once_and_doubled_after_eight_sub_steps() {
+    let mut sim = reduced(simulation());
+    for _ in 0..10 {
+        sim.step().unwrap();
+    }
+    let sizes: Vec<f64> = sim.accepted.iter().map(|[_, dt]| dt * 400.0).collect();
+    let mut expected = vec![4.0];
+    expected.extend([1.0; 8]);
+    expected.extend([2.0; 8]);
+    let full = expected.len();
+    expected.resize(sizes.len(), 4.0);
+    assert_eq!(sizes, expected, "in quarters of the step");
+    assert_eq!((full, sizes.len()), (17, 20));
+    let counts = |k: usize| {
+        let step = &sim.report.steps[k];
+        (step.retries, step.substeps, step.smallest_dt)
+    };
+    assert_eq!([counts(0), counts(1), counts(2)], [(0, 1, 0.01), (2, 4, 0.0025), (0, 4, 0.0025)]);
+    let totals = &sim.report.totals;
+    assert_eq!((totals.retries, totals.reduced), (2, 6));
+    assert_eq!((totals.smallest_dt, totals.smallest_dt_time), (Some(0.0025), Some(0.02)));
+    let refused: Vec<_> =
+        sim.report.refused.iter().map(|r| (r.step, r.time, r.dt, r.reason.as_str())).collect();
+    assert_eq!(refused, [(2, 0.01, 0.01, "diverged: planted"), (2, 0.01, 0.005, "diverged: planted")]);
+    assert_eq!(sim.state.pace, crate::pace::Pace::default(), "back at full size");
+}
+
+#[test]
+fn no_attempt_is_below_the_floor() {
+    let text = SCENE.replace("max_halvings = 3", "max_halvings = 10\ndt_min = 0.002");
+    let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+    let mut sim = Simulation::new(&scene, Assets::default(), SimulationOptions::default()).unwrap();
+    sim.fail = |_, _| true;
+    assert!(matches!(sim.step(), Err(SimError::Diverged { .. })));
+    let sizes: Vec<f64> = sim.report.refused.iter().map(|r| r.dt).collect();
+    assert_eq!(sizes, [0.01, 0.005, 0.0025]);
+    assert_eq!(sim.state.pace, crate::pace::Pace::default(), "an error leaves the pace as it was");
+}
+
+#[test]
+fn a_checkpoint_within_a_reduced_step_goes_on_to_the_same_bits() {
+    let fail: fn(f64, f64) -> bool = |time, dt| (0.004..0.015).contains(&time) && dt > 0.003;
+    let mut straight = reduced(remembering());
+    straight.advance(0.1, &mut || ControlFlow::Continue(())).unwrap();
+    // Stopped before each attempt in turn, saved, and resumed on another number of threads.
+    let mut stops = 0;
+    let mut sim = reduced(remembering());
+    let mut done = sim.advance(0.1, &mut || ControlFlow::Break(())).unwrap();
+    let mut within = 0;
+    while done.interrupted {
+        within += usize::from(sim.under_way.is_some());
+        sim = Simulation::resume(&sim.checkpoint(), Some(1 + stops % 2)).unwrap();
+        sim.fail = fail;
+        let mut asked = 0;
+        done = sim
+            .finish_advance(&mut || {
+                asked += 1;
+                if asked > 1 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            })
+            .unwrap();
+        stops += 1;
+    }
+    assert!(within >= 6, "{within} checkpoints within a step");
+    assert_eq!(sim.state, straight.state);
+    assert_eq!(sim.memory(), straight.memory());
+    let counts = |sim: &Simulation| -> Vec<_> {
+        sim.report
+            .steps
+            .iter()
+            .map(|s| (s.step, s.time, s.retries, s.substeps, s.newton_iterations))
+            .collect()
+    };
+    assert_eq!(counts(&sim), counts(&straight));
+    // Planted: a checkpoint that forgets the pace tries the whole step again.
+    let mut whole = reduced(remembering());
+    whole.fail = |_, _| false;
+    whole.advance(0.1, &mut || ControlFlow::Continue(())).unwrap();
+    assert_ne!(sim.state.x, whole.state.x, "the comparison sees a difference");
+}
+
+#[test]
+fn an_advance_ends_a_step_that_was_left_in_the_middle() {
+    let mut sim = simulation();
+    sim.fail = |time, dt| dt > 0.006 || time > 0.004;
+    sim.step().unwrap_err();
+    sim.fail = |_, _| false;
+    sim.advance(0.02, &mut || ControlFlow::Continue(())).unwrap();
+    let steps: Vec<_> = sim.report.steps.iter().map(|s| (s.time, s.dt)).collect();
+    assert_eq!(steps, [(0.005, 0.005), (0.015, 0.01), (0.025, 0.01)]);
+}
+
+#[test]
+fn a_scene_without_contact_builds_none() {
+    let sim = simulation();
+    assert!(sim.contact.is_none());
+    assert!(sim.plan.running().all(|name| !name.contains("contact") && name != "friction"));
+}
+
+#[test]
+fn a_step_under_error_control_that_fails_is_halved_without_a_trace() {
+    let text = SCENE.replace("dt = 0.01", "dt = \"auto\"");
+    let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+    let auto = || Simulation::new(&scene, Assets::default(), SimulationOptions::default()).unwrap();
+    let mut sim = auto();
+    sim.step().unwrap();
+    let good = sim.state.clone();
+    let mut fails = auto();
+    fails.step().unwrap();
+    // The step begins at 1 ms: its second half fails until it is small enough.
+    fails.fail = |time, dt| time > 1.0001e-3 && time < 1e-2 && dt > 1e-4;
+    fails.step().unwrap();
+    let retries = fails.report.steps[1].retries;
+    assert!(retries > 0);
+    assert_eq!(fails.report.refused.len(), retries as usize);
+    let dt = fails.report.steps[1].dt;
+    let mut straight = auto();
+    straight.step().unwrap();
+    assert!(straight.state == good);
+    straight.state.pace.control.size = dt;
+    straight.step().unwrap();
+    assert_eq!(straight.report.steps[1].dt, dt);
+    assert_eq!((&straight.state.x, &straight.state.v), (&fails.state.x, &fails.state.v));
+    // At the floor it stops, and the state is the last good one.
+    sim.fail = |_, _| true;
+    assert!(matches!(sim.step(), Err(SimError::Diverged { .. })));
+    assert!(sim.state == good);
+    assert_eq!(sim.report.steps.len(), 1);
+}
+
+/// A stiff card that lands on its corner, in steps far too large for its springs.
+fn landing(audited: bool) -> Simulation {
+    let text = r#"
+duration = 1.0
+[time]
+dt = 0.0166
+[contact]
+thickness = 0.004
+[[cloth]]
+name = "card"
+mesh = { generator = "grid", width = 0.1, height = 0.1, nx = 2, ny = 2 }
+material = { areal_density = 0.2, in_plane = { model = "spring", stiffness = 1e4 } }
+position = [0.003, 0.1, 0.002]
+rotation = { axis = [1, 0, 1], angle = 0.6 }
+[[collider]]
+name = "floor"
+shape = { type = "plane", half_size = 1.0 }
+"#;
+    let scene = Scene::parse_toml(text, "test.toml").unwrap();
+    let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+    let mut sim = Simulation::new(&scene, Assets::default(), options).unwrap();
+    sim.audited &= audited;
+    sim
+}
+
+#[test]
+fn energy_that_contact_makes_is_a_failed_step() {
+    // Largest rise of the energy above the least one before, relative to what the fall sets free.
+    let rise = |sim: &mut Simulation| {
+        let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+        let free = 0.2 * 0.01 * 9.81 * 0.1;
+        for _ in 0..40 {
+            sim.step().unwrap();
+            let energy = sim.energy().total();
+            least = least.min(energy);
+            most = most.max(energy - least);
+        }
+        most / free
+    };
+    let mut sim = landing(true);
+    let (kept, made) = (rise(&mut sim), rise(&mut landing(false)));
+    println!("rise: {kept:.2} audited, {made:.2} not; {:?}", sim.report.totals);
+    assert!(sim.report.totals.retries > 0);
+    assert!(sim.report.refused.iter().any(|r| r.reason.contains("contact made")), "{:?}", sim.report.refused);
+    assert!(made > 5.0, "the scene has something to find: {made}");
+    assert!(kept < 0.2 * made, "{kept} of {made}");
+}
