@@ -87,6 +87,15 @@ def draped(contact: Table | None = None, cloth: Table | None = None, **more: obj
     return scene
 
 
+def sewn() -> Table:
+    """The hanging sheet with its left side sewn to its right side: 61 stitches."""
+    scene = hanging()
+    sheet = dict(scene["cloth"][0])  # type: ignore[index]
+    seam = {"pairs": [[61 * row, 61 * row + 60] for row in range(61)], "duration": 10.0}
+    scene["cloth"] = [{**sheet, "seams": [seam]}]
+    return scene
+
+
 def law(name: str, **values: float) -> Table:
     """The contact table's entry of a friction law."""
     return {"friction": {"law": name, **values}}
@@ -117,12 +126,15 @@ CASES = [
     Case("nonlinear", lambda: hanging("nonlinear"), "hanging"),
     Case("plastic", lambda: hanging("plastic"), "hanging"),
     Case("hysteresis", lambda: hanging("hysteresis"), "hanging"),
+    Case("stitches", sewn, "hanging"),
     Case("wind", hanging, "hanging"),
     Case("gravity", hanging, "hanging"),
     Case("air-damping", hanging, "hanging"),
     Case("integrator", hanging, "hanging"),
     Case("linear solver", hanging, "hanging"),
     Case("guard", hanging, "hanging"),
+    Case("adaptive step", draped, "drape", lambda: draped(time={"dt": 0.005, "max_halvings": 0})),
+    Case("error-controlled step", lambda: hanging(time={"dt": "auto"}), "hanging", hanging),
     Case("contact", draped, "drape"),
     Case("self-contact", draped, "drape", lambda: draped({"self": False})),
     Case("friction coulomb", draped, "drape", lambda: draped({"friction": 0.0, "self_friction": 0.0})),

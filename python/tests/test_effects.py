@@ -14,9 +14,12 @@ import clothsim as cs
 README = Path(__file__).parents[2] / "README.md"
 
 UNPRICED = {
-    # Sums over what has a row each, or cannot be had without the rest of contact.
+    # A sum over laws that have a row each.
     "friction",
+    # Cannot be had without the rest of contact.
     "collider contact",
+    # Before the first step, not in a step.
+    "untangled start",
 }
 
 
