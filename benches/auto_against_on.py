@@ -1,16 +1,20 @@
 """Effects that are left out where they cannot matter, against everything on: the same result, and the time
 saved.
 
-Usage: ``python benches/auto_against_on.py [--json] [--steps 150] [--cloths 16]``. Two parts:
+Usage: ``python benches/auto_against_on.py [--json] [--steps 150] [--cloths 16]``. Three parts:
 
 - ``effects.self_collision`` and ``effects.ccd`` = "auto" against "on" in four scenes. Both are stepped in
   turns, one step each, and must have the same bits after every step. Processor milliseconds of a step on one
   thread.
+- ``effects.friction`` = "auto" against "on" with laws of several coefficients, on a slope where cloth sticks, creeps
+  and slides. What it may change is stated: friction per mass is wrong by at most ``friction_tolerance`` μ_s g, against
+  a drag c per mass over the time t, so positions by at most ``friction_tolerance`` μ_s g t/c, and by 2e-6 m/s t as
+  contacts settle to 1e-6 m/s.
 - ``effects.sleep`` against none: napkins that have come to rest on a floor, alone and beside one that is
   awake. What sleep may change is stated: a sleeping vertex misses what it would have crept, at most ``speed``
   times the time asleep.
 
-Exits 1 if a bit differs or a sleeping vertex is farther from the awake one than stated.
+Exits 1 if a bit differs, or if friction or sleep moves a vertex farther than stated.
 """
 
 from __future__ import annotations
@@ -34,6 +38,10 @@ AUTO = {"self_collision": "auto", "ccd": "auto"}
 SLEEP = {"speed": 5e-3, "time": 0.1}
 FLOOR = {"name": "floor", "shape": {"type": "plane", "half_size": 4.0}}
 CONTACT = {"thickness": 0.005, "friction": 0.4}
+STRIBECK = {"law": "stribeck", "mu_c": 0.1, "mu_s": 0.3, "v_s": 0.5, "delta_s": 1.0}
+VISCOUS = {**STRIBECK, "law": "viscous", "f_v": 5.0, "delta_v": 1.0}
+FRICTION_TOLERANCE = 0.02
+DRAG = 60.0
 
 
 def sheet(name: str, size: float, n: int, **more: Any) -> dict[str, Any]:
@@ -76,7 +84,7 @@ def scenes() -> dict[str, dict[str, Any]]:
 def build(parts: dict[str, Any], effects: dict[str, Any] | None = None) -> cs.Simulation:
     """The simulation of a scene on one thread."""
     more = {"effects": effects} if effects else {}
-    scene = cs.Scene(duration=10.0, time={"dt": 0.005}, contact=CONTACT, **parts, **more)
+    scene = cs.Scene(duration=10.0, time={"dt": 0.005}, **{"contact": CONTACT, **parts}, **more)
     return cs.Simulation(scene, threads=1, device="cpu")
 
 
@@ -109,6 +117,48 @@ def proofs(steps: int) -> list[dict[str, Any]]:
                 "step_auto_ms": taken[1] / steps,
                 "flat": float(np.mean([c["flat_triangles"] for c in seen])) / triangles,
                 "detections_left_out": float(np.mean([c["looked_at"] == 0 for c in seen])),
+            }
+        )
+    return rows
+
+
+def slope(angle: float, law: dict[str, Any]) -> dict[str, Any]:
+    """A sheet on a slope [rad], heavily damped."""
+    turn = {"axis": [0, 0, 1], "angle": angle}
+    place = [-0.0051 * float(np.sin(angle)), 0.0051 * float(np.cos(angle)), 0.0]
+    return {
+        "air": {"damping": DRAG},
+        "contact": {**CONTACT, "friction": law},
+        "cloth": [sheet("sheet", 0.5, 41, rotation=turn, position=place)],
+        "collider": [{**FLOOR, "rotation": turn}],
+    }
+
+
+def frictions(steps: int) -> list[dict[str, Any]]:
+    """Friction that leaves out terms of speed against the whole law."""
+    rows = []
+    for label, parts in {
+        "slope of 0.2, stribeck: sticks": slope(0.2, STRIBECK),
+        "slope of 0.2, viscous: sticks": slope(0.2, VISCOUS),
+        "slope of 0.302, stribeck: creeps": slope(0.302, STRIBECK),
+        "slope of 0.5, stribeck: slides": slope(0.5, STRIBECK),
+    }.items():
+        print(f"{label}: {steps} steps of two", file=sys.stderr)
+        on, auto = build(parts), build(parts, {"friction": "auto", "friction_tolerance": FRICTION_TOLERANCE})
+        taken = [0.0, 0.0]
+        for _ in range(steps):
+            taken[0] += step(on)
+            taken[1] += step(auto)
+        away = np.linalg.norm(on.positions - auto.positions, axis=1).max()
+        allowed = 0.005 * steps * (FRICTION_TOLERANCE * STRIBECK["mu_s"] * 9.81 / DRAG + 2e-6)
+        rows.append(
+            {
+                "scene": label,
+                "slow": float(np.mean([s["contact"]["slow_friction"] > 0 for s in auto.report["steps"]])),
+                "step_on_ms": taken[0] / steps,
+                "step_auto_ms": taken[1] / steps,
+                "farthest_mm": 1e3 * float(away),
+                "allowed_mm": 1e3 * allowed,
             }
         )
     return rows
@@ -168,9 +218,10 @@ def main() -> None:
     parser.add_argument("--cloths", type=int, default=16)
     parser.add_argument("--json", action="store_true", help="print JSON")
     options = parser.parse_args()
-    first, second = proofs(options.steps), sleeping(options.cloths, max(20, options.steps // 4))
+    first, friction = proofs(options.steps), frictions(options.steps)
+    second = sleeping(options.cloths, max(20, options.steps // 4))
     if options.json:
-        print(json.dumps({"auto": first, "sleep": second}, indent=2))
+        print(json.dumps({"auto": first, "friction": friction, "sleep": second}, indent=2))
     else:
         print("| scene | same bits | step on, auto [ms] | proved flat | CCD left out |\n|---|---|---|---|---|")
         for r in first:
@@ -180,6 +231,12 @@ def main() -> None:
                 f"{100 * r['flat']:.0f} % of triangles | "
                 f"{100 * r['detections_left_out']:.0f} % of steps |"
             )
+        print("\n| scene | slow friction | step on, auto [ms] | farthest from on, allowed [mm] |\n|---|---|---|---|")
+        for r in friction:
+            print(
+                f"| {r['scene']} | {100 * r['slow']:.0f} % of steps | "
+                f"{r['step_on_ms']:.2f}, {r['step_auto_ms']:.2f} | {r['farthest_mm']:.4f}, {r['allowed_mm']:.4f} |"
+            )
         print(
             "\n| scene | asleep | step awake, with sleep [ms] | farthest from awake, allowed [mm] |\n|---|---|---|---|"
         )
@@ -188,7 +245,7 @@ def main() -> None:
                 f"| {r['scene']} | {r['asleep']} | {r['step_awake_ms']:.2f}, {r['step_asleep_ms']:.3f} | "
                 f"{r['farthest_mm']:.3f}, {r['allowed_mm']:.3f} |"
             )
-    if not all(r["same_bits"] for r in first) or any(r["farthest_mm"] > r["allowed_mm"] for r in second):
+    if not all(r["same_bits"] for r in first) or any(r["farthest_mm"] > r["allowed_mm"] for r in friction + second):
         raise SystemExit(1)
 
 

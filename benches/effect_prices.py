@@ -101,6 +101,9 @@ def law(name: str, **values: float) -> Table:
     return {"friction": {"law": name, **values}}
 
 
+STRIBECK = law("stribeck", mu_c=0.3, mu_s=0.4, v_s=0.1, delta_s=1.0)
+
+
 @dataclass
 class Case:
     """An effect, the scene that prices it, and the scene without it where it has no row of its own."""
@@ -144,7 +147,7 @@ CASES = [
     ),
     Case(
         "friction stribeck",
-        lambda: draped(law("stribeck", mu_c=0.3, mu_s=0.4, v_s=0.1, delta_s=1.0)),
+        lambda: draped(STRIBECK),
         "drape",
         draped,
     ),
@@ -154,6 +157,12 @@ CASES = [
     Case("flatness proofs", lambda: draped(effects={"self_collision": "auto"}), "drape", draped),
     Case("gap proofs", lambda: draped(effects={"ccd": "auto"}), "drape", draped),
     Case("both proofs", lambda: draped(effects=AUTO), "drape", draped),
+    Case(
+        "slow friction",
+        lambda: draped(STRIBECK, effects={"friction": "auto"}),
+        "drape",
+        lambda: draped(STRIBECK),
+    ),
     Case("sleep", lambda: draped(effects={"sleep": {}}), "drape", draped),
 ]
 

@@ -60,6 +60,7 @@ WITHOUT_CONTACT = {
 WITH_CONTACT = {
     "flatness proofs": {"tables": '[effects]\nself_collision = "on"\n'},
     "gap proofs": {"tables": '[effects]\nccd = "on"\n'},
+    "slow friction": {"tables": '[effects]\nfriction = "on"\n'},
     "constraints": {"contact": 'method = "velocity-filter"\n'},
     "intersection count": {"contact": "allow_intersections = false\n"},
     "friction laws": {

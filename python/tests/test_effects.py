@@ -29,10 +29,9 @@ def _scene(**more: Any) -> cs.Scene:
     return cs.Scene(
         duration=1.0,
         air={"damping": 4.0},
-        contact={"thickness": 0.006},
         cloth=[{"name": "napkin", "mesh": mesh, "material": "cotton", "position": [0.0, 0.02, 0.0]}],
         collider=[{"name": "floor", "shape": {"type": "plane", "half_size": 1.0}}],
-        **more,
+        **{"contact": {"thickness": 0.006}, **more},
     )
 
 
@@ -49,6 +48,27 @@ def test_auto_gives_the_same_bits_and_says_what_it_left_out() -> None:
     assert all(step["contact"]["flat_triangles"] == 0 for step in on.report["steps"])
 
 
+def test_slow_friction_is_planned_and_reported() -> None:
+    law = {"law": "stribeck", "mu_c": 0.1, "mu_s": 0.3, "v_s": 0.5, "delta_s": 1.0}
+
+    def napkin(friction: Any, choice: str) -> cs.Simulation:
+        contact = {"thickness": 0.006, "friction": friction}
+        return cs.Simulation(_scene(contact=contact, effects={"friction": choice}), threads=1)
+
+    on, auto, plain = napkin(law, "on"), napkin(law, "auto"), napkin(0.3, "auto")
+    why = [next(e for e in sim.plan["effects"] if e["name"] == "slow friction") for sim in (on, auto, plain)]
+    assert [e["on"] for e in why] == [False, True, False]
+    assert "m/s" in why[1]["why"]
+    assert "Coulomb" in why[2]["why"]
+    for sim in (on, auto):
+        sim.advance(0.2)
+    slow = [[s["contact"]["slow_friction"] for s in sim.report["steps"]] for sim in (on, auto)]
+    assert not any(slow[0])
+    assert sum(slow[1]) > 20
+    # Contacts settle to 1e-6 m/s.
+    assert np.abs(on.positions - auto.positions).max() <= 2e-6 * 0.2
+
+
 def test_cloth_at_rest_sleeps(tmp_path: Path) -> None:
     sim = cs.Simulation(_scene(effects={"sleep": {"speed": 5e-3, "time": 0.1}}), threads=1)
     sim.advance(0.6)
@@ -60,6 +80,8 @@ def test_cloth_at_rest_sleeps(tmp_path: Path) -> None:
 
 
 def test_unknown_choices_are_named() -> None:
+    with pytest.raises(cs.InvalidScene, match=r"effects\.friction_tolerance.*< 1"):
+        cs.Simulation(_scene(effects={"friction_tolerance": 1.0}))
     with pytest.raises(cs.InvalidScene, match=r"effects\.ccd.*auto"):
         cs.Simulation(_scene(effects={"ccd": "never"}))
 

@@ -39,6 +39,9 @@ pub struct ResponseInfo {
     pub sticking: usize,
     /// Contacts with friction that carry an impulse and slide.
     pub sliding: usize,
+    /// Friction was Coulomb's with the coefficients at rest, as no contact was fast enough for more
+    /// ([`crate::ResponseParams::friction_tolerance`]).
+    pub slow_friction: bool,
     /// Edges of cloth that strain limiting pulled or pushed.
     pub limited_edges: usize,
     /// Times that the strain limits were linearised anew.

@@ -27,6 +27,9 @@ pub struct ResponseParams {
     /// The first continuous detection leaves out vertices that cannot carry a pair across its gap in the step, and is left out if
     /// there are no others. Accepted steps do not depend on it.
     pub skip_proved: bool,
+    /// Relative error ε of a friction coefficient, in (0, 1), for which steps in which all is slow enough leave out the terms that
+    /// depend on speed; `None`: never left out.
+    pub friction_tolerance: Option<f64>,
     /// Pairs in contact already at `x_t0` are exempt from acceptance and counted. Without this they make the step
     /// [`ResponseError::Unresolved`].
     pub allow_initial_contacts: bool,
@@ -44,6 +47,7 @@ impl Default for ResponseParams {
             velocity_tolerance: 1e-6,
             vertices_carry: false,
             skip_proved: false,
+            friction_tolerance: None,
             allow_initial_contacts: false,
         }
     }
@@ -68,6 +72,13 @@ impl ResponseParams {
             if !inside {
                 return Err(ResponseError::Parameter { name, expected, got });
             }
+        }
+        if let Some(got) = self.friction_tolerance.filter(|t| !(*t > 0.0 && *t < 1.0)) {
+            return Err(ResponseError::Parameter {
+                name: "friction_tolerance",
+                expected: "a number > 0 and < 1",
+                got,
+            });
         }
         for (name, got) in [("max_passes", self.max_passes), ("max_sweeps", self.max_sweeps)] {
             if got == 0 {
@@ -101,6 +112,9 @@ mod tests {
                 .contains("mu_c")
         );
         assert!(bad(&|p| p.friction = FrictionRule::from_pairs(3, |_, _| law)).contains("friction"));
+        for tolerance in [0.0, 1.0, f64::NAN] {
+            assert!(bad(&|p| p.friction_tolerance = Some(tolerance)).contains("friction_tolerance"));
+        }
         assert!(bad(&|p| p.max_passes = 0).contains("max_passes"));
     }
 }

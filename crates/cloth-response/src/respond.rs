@@ -3,6 +3,7 @@
 use crate::collisions::Detection;
 use crate::friction::general::General;
 use crate::friction::kernel::Coulomb;
+use crate::friction::slow::Slow;
 use crate::motion::{Motion, MotionBuffers};
 use crate::stages::Stages;
 use crate::strain::limiter::Limiter;
@@ -19,6 +20,8 @@ pub struct Responder {
     buffers: MotionBuffers,
     contacts: Contacts,
     stages: Stages,
+    /// Tried before `contacts`.
+    slow: Option<ContactSet<Slow>>,
 }
 
 /// The contacts, with the kernel of friction that the scene asks for.
@@ -42,6 +45,7 @@ impl Responder {
                 Contacts::General(ContactSet::new(General::new(params.friction.laws())))
             },
             stages: Stages::new(params.skip_proved),
+            slow: Slow::new(&params.friction, params.friction_tolerance).map(ContactSet::new),
             params,
         })
     }
@@ -95,6 +99,12 @@ impl Responder {
         self.stages.sides = sides;
     }
 
+    /// Least speed \[m/s\] from which a law is taken as it is, with [`ResponseParams::friction_tolerance`]; 0: as soon as a contact
+    /// slides. `None` where nothing is left out.
+    pub fn slow_speed(&self) -> Option<f64> {
+        self.slow.as_ref().map(|contacts| contacts.kernel.speed())
+    }
+
     /// Memory of the buffers that are kept from step to step \[B\]: what each vertex needs from the start, and what the
     /// contacts of the steps so far have needed.
     pub fn bytes(&self) -> usize {
@@ -102,7 +112,8 @@ impl Responder {
             Contacts::Coulomb(contacts) => contacts.bytes(),
             Contacts::General(contacts) => contacts.bytes(),
         };
-        self.buffers.bytes() + contacts + self.stages.bytes()
+        let slow = self.slow.as_ref().map_or(0, ContactSet::bytes);
+        self.buffers.bytes() + contacts + slow + self.stages.bytes()
     }
 
     /// Changes `x_t1` and `v` so that the straight motion `x_t0` → `x_t1` has no known collision.
@@ -210,6 +221,14 @@ impl Responder {
     ) -> Result<ResponseInfo, ResponseError> {
         let mesh = detection.mesh;
         check_input(mesh.vertex_count, inv_mass, x_t0, x_t1, v, dt)?;
+        if let Some(contacts) = &mut self.slow {
+            let motion = &mut Motion::new(&mut self.buffers, inv_mass, x_t0, x_t1, dt);
+            // What fails here may not fail with the whole law.
+            if let Ok(Some(info)) = self.stages.run(&self.params, contacts, &mut detection, motion) {
+                self.write(inv_mass, x_t1, v);
+                return Ok(ResponseInfo { slow_friction: true, ..info });
+            }
+        }
         let motion = &mut Motion::new(&mut self.buffers, inv_mass, x_t0, x_t1, dt);
         let info = match &mut self.contacts {
             Contacts::Coulomb(contacts) => self.stages.run(&self.params, contacts, &mut detection, motion)?,
@@ -221,14 +240,20 @@ impl Responder {
                 self.stages.run(&self.params, contacts, &mut detection, motion)?
             }
         };
-        for i in 0..mesh.vertex_count {
+        self.write(inv_mass, x_t1, v);
+        // Only a tentative kernel is given up.
+        Ok(info.unwrap_or_default())
+    }
+
+    /// Writes the motion of what is not prescribed.
+    fn write(&self, inv_mass: &[f64], x_t1: &mut [Vec3], v: &mut [Vec3]) {
+        for i in 0..x_t1.len() {
             let change = self.buffers.velocity[i] - self.buffers.velocity_start[i];
             if inv_mass[i] > 0.0 && change != Vec3::zeros() {
                 x_t1[i] = self.buffers.end[i];
                 v[i] += change;
             }
         }
-        Ok(info)
     }
 }
 

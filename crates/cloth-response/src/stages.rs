@@ -14,7 +14,7 @@ use crate::strain::limiter::Limiter;
 use crate::sweeps::ContactSet;
 use crate::zones::{Zones, move_zones};
 use crate::{ResponseError, ResponseInfo, ResponseParams, Vec3};
-use cloth_collision::StencilKind;
+use cloth_collision::{Stencil, StencilKind};
 use std::collections::{BTreeSet, HashSet};
 use std::time::Instant;
 
@@ -41,6 +41,14 @@ pub(crate) struct Stages {
     shared: HashSet<[u32; 4]>,
     /// Which vertices the first detection looks at; none: all.
     pub(crate) gaps: Option<Gaps>,
+    /// What a run that was given up leaves to the one that takes the step instead.
+    left: Option<Left>,
+}
+
+/// Of a run with a tentative kernel.
+struct Left {
+    near: Vec<Stencil>,
+    seconds: Vec<(&'static str, f64)>,
 }
 
 impl Stages {
@@ -63,6 +71,7 @@ impl Stages {
             + self.spare_sides.bytes()
             + slots
             + self.gaps.as_ref().map_or(0, Gaps::bytes)
+            + self.left.as_ref().map_or(0, |left| bytes_of(&left.near))
     }
 
     /// Takes over what the last run found out about sides.
@@ -73,15 +82,18 @@ impl Stages {
     }
 
     /// Changes the motion so that it has no known collision and keeps the strain limits.
+    ///
+    /// `None`: the kernel is tentative and does not hold ([`Kernel::holds`]); the motion is to be taken anew with another.
     pub(crate) fn run<K: Kernel>(
         &mut self,
         params: &ResponseParams,
         contacts: &mut ContactSet<K>,
         detection: &mut Detection<'_>,
         motion: &mut Motion<'_>,
-    ) -> Result<ResponseInfo, ResponseError> {
+    ) -> Result<Option<ResponseInfo>, ResponseError> {
+        let left = self.left.take();
         let mut sides = self.next_sides.take().unwrap_or_else(|| std::mem::take(&mut self.spare_sides));
-        let Self { rest_x, limiter, frames, zones, hits, shared, gaps, .. } = self;
+        let Self { rest_x, limiter, frames, zones, hits, shared, gaps, left: kept, .. } = self;
         let (mesh, x_t0, resting) = (detection.mesh, motion.x_t0, detection.resting);
         let moving = resting.map(|r| r.moving);
         let mut met = BTreeSet::new();
@@ -93,8 +105,15 @@ impl Stages {
         hits.clear();
 
         // 1. Near pairs at the start: resting contact and repulsion.
-        let mut near =
-            detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, moving, detection.pool)?;
+        let mut near = if let (Some(left), false) = (left, K::TENTATIVE) {
+            info.seconds = left.seconds;
+            left.near
+        } else {
+            detection.bvh.proximity(mesh, x_t0, BAND * params.thickness, moving, detection.pool)?
+        };
+        if K::TENTATIVE {
+            *kept = Some(Left { near: near.clone(), seconds: Vec::new() });
+        }
         info.proximities = near.len();
         info.flat_triangles = detection.bvh.flat_triangles();
         if let Some(resting) = resting {
@@ -115,6 +134,9 @@ impl Stages {
         });
         settle(contacts, limiter, motion, params, &mut info);
         clock.lap(&mut info, "impulses");
+        if !contacts.hold(motion, params.velocity_tolerance) {
+            return Ok(self.give_up(sides, info));
+        }
 
         // 2. Collisions during the step, answered by impulses; the first look is at all pairs.
         let mut exempt = HashSet::new();
@@ -164,6 +186,9 @@ impl Stages {
                 }
                 let moved = settle(contacts, limiter, motion, params, &mut info);
                 clock.lap(&mut info, "impulses");
+                if !contacts.hold(motion, params.velocity_tolerance) {
+                    return Ok(self.give_up(sides, info));
+                }
                 if moved == 0 {
                     break;
                 }
@@ -211,11 +236,25 @@ impl Stages {
             judge(hits);
             clock.lap(&mut info, "strain");
         }
+        // Zones, holding back and limits move vertices too.
+        if !contacts.hold(motion, params.velocity_tolerance) {
+            return Ok(self.give_up(sides, info));
+        }
+        *kept = None;
         info.exempt = exempt.len();
         wake(&met)?;
         sides.end_step(|kind, vertices| exempt.contains(&(kind, vertices)));
         self.next_sides = Some(sides);
-        Ok(info)
+        Ok(Some(info))
+    }
+
+    /// Ends a run whose kernel does not hold.
+    fn give_up(&mut self, sides: Sides, info: ResponseInfo) -> Option<ResponseInfo> {
+        self.spare_sides = sides;
+        if let Some(left) = &mut self.left {
+            left.seconds = info.seconds;
+        }
+        None
     }
 }
 

@@ -98,6 +98,12 @@ impl<K: Kernel> ContactSet<K> {
         &self.contacts
     }
 
+    /// Whether the kernel stands for the laws of all contacts ([`Kernel::holds`]).
+    pub(crate) fn hold(&self, motion: &Motion<'_>, tolerance: f64) -> bool {
+        let velocity = &motion.buffers.velocity;
+        !K::TENTATIVE || self.contacts.iter().all(|c| self.kernel.holds(c, velocity, tolerance))
+    }
+
     /// Counts the contacts that carry an impulse, and those of them that slide, by more than `tolerance` [m/s], and that
     /// stick.
     pub(crate) fn count(&self, motion: &Motion<'_>, tolerance: f64, info: &mut ResponseInfo) {

@@ -68,6 +68,8 @@ impl ContactStage {
             max_passes: contact.max_passes,
             max_zone_passes: contact.max_zone_passes,
             vertices_carry: constraints.is_some(),
+            friction_tolerance: (meets && constraints.is_none() && scene.effects.friction == Choice::Auto)
+                .then_some(scene.effects.friction_tolerance),
             skip_proved: meets && scene.effects.ccd == Choice::Auto,
             allow_initial_contacts: allow,
             ..ResponseParams::default()

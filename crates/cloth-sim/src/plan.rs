@@ -457,6 +457,7 @@ fn plan_auto(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Optio
         }
         (Choice::Auto, None) => effects.off("gap proofs", "the scene has no [contact]"),
     }
+    plan_slow_friction(effects, scene, meeting);
     match scene.effects.sleep {
         None => effects.off("sleep", "the scene has no effects.sleep"),
         Some(sleep) => {
@@ -464,6 +465,33 @@ fn plan_auto(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Optio
             effects.on("sleep", why, bodies.cloth.len(), 2 * bodies.vertices);
         }
     }
+}
+
+/// Steps without the terms of friction that depend on speed.
+fn plan_slow_friction(effects: &mut Effects, scene: &Scene, meeting: Option<&ContactStage>) {
+    let name = "slow friction";
+    if scene.effects.friction == Choice::On {
+        return effects.off(name, "effects.friction = \"on\"");
+    }
+    let Some(stage) = meeting else {
+        return effects.off(name, "the scene has no [contact]");
+    };
+    if stage.constraints.is_some() {
+        return effects.off(name, "contact.method = \"constraints\" has a friction of its own");
+    }
+    let Some(speed) = stage.responder.slow_speed() else {
+        return effects.off(name, "all laws are Coulomb's: no term depends on speed");
+    };
+    let when = if speed == f64::INFINITY {
+        "in all steps, as no law differs by more".to_owned()
+    } else if speed > 0.0 {
+        format!("while no contact can slide faster than {speed:.3e} m/s")
+    } else {
+        "while all contacts stick".to_owned()
+    };
+    let tolerance = scene.effects.friction_tolerance;
+    let why = format!("effects.friction = \"auto\": Coulomb's law {when} (friction_tolerance {tolerance})");
+    effects.on(name, why, stage.mesh.bodies.len(), 0);
 }
 
 /// The name of a choice as a scene file writes it.

@@ -178,6 +178,9 @@ pub struct ContactReport {
     /// (`effects.ccd = "auto"`).
     #[serde(default)]
     pub looked_at: usize,
+    /// Sub-steps in which friction was Coulomb's, as no contact was fast enough for more (`effects.friction = "auto"`).
+    #[serde(default)]
+    pub slow_friction: usize,
     /// Continuous detections over the step.
     pub passes: usize,
     /// Pairs that collided in the first of them.
@@ -226,6 +229,7 @@ impl ContactReport {
         self.by_side += info.by_side;
         self.flat_triangles += info.flat_triangles;
         self.looked_at += info.looked_at;
+        self.slow_friction += usize::from(info.slow_friction);
         self.passes += info.passes;
         self.collisions += info.collisions;
         self.impulses += info.impulses;

@@ -49,6 +49,14 @@ pub(crate) trait Kernel {
         again: impl FnMut(usize),
     );
 
+    /// Whether the kernel stands for other laws only where [`Kernel::holds`] says so.
+    const TENTATIVE: bool = false;
+
+    /// Whether a contact that the sweeps have settled within `tolerance` \[m/s\] is as its own law wants it.
+    fn holds(&self, _contact: &Contact<Self::State>, _velocity: &[Vec3], _tolerance: f64) -> bool {
+        true
+    }
+
     /// Memory \[B\].
     fn bytes(&self) -> usize;
 }

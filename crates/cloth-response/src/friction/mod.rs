@@ -9,6 +9,7 @@ pub(crate) mod general;
 pub(crate) mod kernel;
 pub(crate) mod law;
 pub(crate) mod rule;
+pub(crate) mod slow;
 
 use crate::Vec3;
 

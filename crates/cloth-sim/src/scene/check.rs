@@ -83,6 +83,11 @@ impl Scene {
     }
 
     fn check_effects(&self) -> Result<(), SceneError> {
+        let tolerance = self.effects.friction_tolerance;
+        if !(tolerance > 0.0 && tolerance < 1.0) {
+            let got = tolerance.to_string();
+            return Err(self.error("effects.friction_tolerance", "a number > 0 and < 1", got));
+        }
         let Some(sleep) = &self.effects.sleep else { return Ok(()) };
         self.positive("effects.sleep.speed", sleep.speed, "m/s")?;
         self.positive("effects.sleep.time", sleep.time, "s")?;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// What the engine may decide by itself. By default everything that the scene holds runs in every step.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Effects {
     /// The search of cloth near itself: "auto" passes over surfaces whose normals and contour prove that they do not come near
@@ -12,9 +12,21 @@ pub struct Effects {
     /// The continuous detection of a step: "auto" leaves out vertices that do not move far enough to carry a pair across its gap, and
     /// the detection where there are no others. Results do not depend on it.
     pub ccd: Choice,
+    /// Terms of friction that depend on speed: "auto" takes steps in which no contact is fast enough for them with Coulomb's law and
+    /// the coefficients at rest.
+    pub friction: Choice,
+    /// Largest relative error that `friction = "auto"` may make in a coefficient [-], in (0, 1).
+    pub friction_tolerance: f64,
     /// Cloth that has come to rest is no longer stepped until something that moves comes near; without this table none sleeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sleep: Option<Sleep>,
+}
+
+impl Default for Effects {
+    fn default() -> Self {
+        let on = Choice::On;
+        Self { self_collision: on, ccd: on, friction: on, friction_tolerance: 0.01, sleep: None }
+    }
 }
 
 impl Effects {
