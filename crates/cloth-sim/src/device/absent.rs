@@ -22,7 +22,7 @@ impl SharedGpu {
     pub fn set_takes_software(&self, _takes: bool) {}
 
     /// None is open.
-    pub(super) fn is_hardware(&self) -> bool {
+    pub fn is_hardware(&self) -> bool {
         false
     }
 

@@ -73,7 +73,7 @@ impl SharedGpu {
     }
 
     /// Whether a GPU is open that is no software adapter.
-    pub(super) fn is_hardware(&self) -> bool {
+    pub fn is_hardware(&self) -> bool {
         self.gpu().is_some_and(|gpu| !gpu.is_software())
     }
 
