@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[1]
 MODEL = ROOT / "crates" / "cloth-sim" / "src" / "cost_model.json"
 README = ROOT / "README.md"
 BEGIN, END = "<!-- effect prices: begin -->", "<!-- effect prices: end -->"
-COMMAND = "python benches/effect_prices.py --write"
+COMMAND = "python benches/effect_prices.py --steps 12 --write"
 WARM_UP = 5
 """Steps before the clock starts."""
 
@@ -74,7 +74,7 @@ def draped(contact: Table | None = None, cloth: Table | None = None, **more: obj
     scene = hanging(**more)
     sheet = dict(scene["cloth"][0])  # type: ignore[index]
     del sheet["pins"], scene["air"]
-    scene["contact"] = {"thickness": 0.005, "friction": 0.3, "self_friction": 0.2, **(contact or {})}
+    scene["contact"] = {"detector": "bvh", "thickness": 0.005, "friction": 0.3, "self_friction": 0.2, **(contact or {})}
     scene["cloth"] = [{**sheet, "position": [0.01, 0.2537, 0.005], **(cloth or {})}]
     turn = {"axis": [0, 1, 0], "angle": 3.0}
     scene["collider"] = [
