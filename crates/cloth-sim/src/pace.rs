@@ -11,7 +11,9 @@
 use crate::auto_step::Control;
 use crate::guard::Alarm;
 use crate::ledger::{self, Ledger};
+use crate::plan::ELASTIC_HINGES;
 use crate::report::{Refused, add_seconds};
+use crate::scene::Choice;
 use crate::step::Failure;
 use crate::{SimError, Simulation, StepReport};
 use std::ops::ControlFlow;
@@ -247,6 +249,7 @@ impl Simulation {
         let clock = Instant::now();
         self.fall_asleep(report.dt)?;
         report.asleep = self.state.rest.sleepers();
+        report.remembering = self.note_history();
         self.state.step += 1;
         report.step = self.state.step;
         report.time = self.state.time;
@@ -264,6 +267,16 @@ impl Simulation {
             self.report.grow("sleep", sleeper.bytes());
         }
         Ok(())
+    }
+
+    /// How many hinges remember, with `effects.history = "auto"`; notes the memory that this takes.
+    fn note_history(&mut self) -> Option<usize> {
+        if self.scene.effects.history == Choice::On {
+            return None;
+        }
+        let histories = self.histories();
+        self.report.grow(ELASTIC_HINGES, histories.iter().map(|h| h.bytes).sum());
+        Some(histories.iter().map(|h| h.kept).sum())
     }
 
     /// Notes that an attempt of `dt` [s] from here was given up.
