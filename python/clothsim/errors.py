@@ -223,7 +223,7 @@ class GpuUnavailable(DeviceError):
     message : str
         What is missing, and what to do.
     device : str
-        The device that was asked for.
+        The adapter with its driver, where there is one.
     """
 
 
