@@ -508,7 +508,7 @@ fn energy_made_is_found_while_pins_move_wind_blows_cloth_sleeps_and_steps_are_ch
          pins = [{ vertices = [0, 1], keyframes = [{ time = 0.0 }, { time = 1.0, position = [0.0, 0.01, 0.0] }] }]",
     );
     let still = cloth("still", "position = [0.5, 0.0041, 0.0]");
-    let sleep = "[effects]\nsleep = { speed = 0.5, time = 0.02 }\n[air]\ndamping = 0.1\n";
+    let sleep = "[effects]\nsleep = { speed = 0.05, time = 0.02 }\n[air]\ndamping = 0.1\n";
     let wind = "[air]\nwind = [0.2, 0.0, 0.0]\ndensity = 1.2\ndrag = 1.0\n";
     let loose = "dt = \"auto\"\ndt_tolerance = 100.0\ndt_max = 0.0166";
     for (what, time, tables, bodies) in [
