@@ -11,6 +11,7 @@ from collections.abc import Sequence
 __all__ = [
     "CheckpointError",
     "ClothSimError",
+    "ClusterError",
     "DeviceError",
     "GpuUnavailable",
     "IntersectingStart",
@@ -217,6 +218,10 @@ class DeviceError(ClothSimError, RuntimeError):
 
 class GpuUnavailable(DeviceError):
     """A GPU was asked for, and there is none that can be used."""
+
+
+class ClusterError(ClothSimError, ConnectionError):
+    """The workers of a sweep cannot be reached, or do not start; what has finished is kept."""
 
 
 class MissingDependency(ClothSimError, ImportError):

@@ -1,7 +1,7 @@
 """The output folder of a run: what it may hold, and the hidden work folder that makes a run resumable.
 
 ``OUT/.clothsim`` holds the frames so far, the last two checkpoints and a lock, and is removed when all outputs are
-written. A checkpoint counts the frames that belong to it, so that a run killed at any moment goes on from there. Its first
+written. A checkpoint counts its frames, so that a run killed at any moment goes on from there. Its first
 line has the number of bytes that follow and their CRC-32: a damaged one is known, and the one before it is used.
 """
 

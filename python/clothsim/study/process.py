@@ -16,7 +16,7 @@ import numpy as np
 from clothsim._files import whole, write_whole
 from clothsim.errors import ClothSimError, OutputError
 
-__all__ = ["UNWRITTEN", "serve"]
+__all__ = ["UNWRITTEN", "die_with_parent", "serve"]
 
 # Exit code of a process whose result could not be written (EX_IOERR of sysexits.h).
 UNWRITTEN = 74
@@ -32,7 +32,7 @@ def serve(path: Path, run: Callable[[dict[str, Any]], tuple[dict[str, Any], Mapp
     run : callable
         Takes the job, returns facts for JSON and arrays by name.
     """
-    _die_with_parent()
+    die_with_parent()
     job = json.loads(path.read_bytes())
     if job["cores"] and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job["cores"])
@@ -59,7 +59,7 @@ def _unwritten(error: OutputError) -> int:
     return UNWRITTEN
 
 
-def _die_with_parent() -> None:
+def die_with_parent() -> None:
     """End when the parent does, however it ends: its end of the pipe closes."""
 
     def watch() -> None:

@@ -24,7 +24,7 @@ from clothsim.study.disturb import disturbed
 from clothsim.study.process import serve
 from clothsim.study.state import pinned
 
-__all__ = ["pack_scene", "run_job", "unpack_scene"]
+__all__ = ["LATE", "joined", "pack_scene", "run_job", "unpack_scene"]
 
 # Share of the run after which what sticks is watched.
 LATE = 0.75
@@ -138,7 +138,7 @@ def _observe(
     x, v = simulation.positions, simulation.velocities
     arrays: dict[str, Any] = {
         "x_start": x, "v_start": v, "masses": simulation.masses,
-        "triangles": _joined(cloths), "collider_triangles": _joined(colliders),
+        "triangles": joined(cloths), "collider_triangles": joined(colliders),
         "collider_start": simulation.collider_positions, "pinned": pinned(data, cloths, x),
         "counts": np.array([b.vertex_count for b in cloths]),
     }  # fmt: skip
@@ -172,7 +172,8 @@ def _observe(
     return facts, arrays
 
 
-def _joined(bodies: list[Any]) -> Any:
+def joined(bodies: list[Any]) -> Any:
+    """Triangles of all bodies, with indices into all their vertices."""
     first, out = 0, [np.zeros((0, 3), dtype=np.int64)]
     for body in bodies:
         out.append(np.asarray(body.triangles) + first)
