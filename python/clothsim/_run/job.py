@@ -256,7 +256,7 @@ class Job:
         every: int,
     ) -> SimulationDiverged | SimulationStuck | SolverFailed | None:
         """Go on to the last frame; return the error that stopped it before, if one did."""
-        core, bodies = simulation._core, simulation.bodies
+        core, bodies, already = simulation._core, simulation.bodies, writer.frames
         bar = progress_bar(len(lengths) + 1, initial=writer.frames, enabled=self.progress, name=self.scene.name)
         error: SimulationDiverged | SimulationStuck | SolverFailed | None = None
         try:
@@ -293,7 +293,8 @@ class Job:
                         raise Stopped(0, writer.frames, len(lengths) + 1, simulation.time, reason)
                     if every > 0 and writer.frames % every == 0:
                         checkpoint()
-            checkpoint()
+            if writer.frames > already or error is not None:
+                checkpoint()
         finally:
             bar.close()
         return error
