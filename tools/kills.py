@@ -95,8 +95,9 @@ def run(folder: Path, kills: int, chance: random.Random, *, plant_fault: bool = 
             _remove(out)
             continue
         phase = _phase(out)
-        if plant_fault:
-            _spoil(out)
+        if plant_fault and not _spoil(out):
+            _remove(out)
+            continue
         threads = str(chance.choice([1, 2]))
         resumed = subprocess.run(
             [*_command(scene, out), "--resume", "--threads", threads], capture_output=True, text=True, check=False
@@ -159,14 +160,16 @@ def _phase(out: Path) -> str:
     return "between checkpoints" if (work / "checkpoint").exists() else "before the first checkpoint"
 
 
-def _spoil(out: Path) -> None:
-    """Change a bit of the first frame that was kept."""
+def _spoil(out: Path) -> bool:
+    """Change a bit of the first frame that a checkpoint counts, if there is one."""
     rows = out / ".clothsim" / "frames.bin"
-    if rows.exists() and rows.stat().st_size:
-        with rows.open("r+b") as file:
-            first = file.read(1)
-            file.seek(0)
-            file.write(bytes([first[0] ^ 1]))
+    if not (out / ".clothsim" / "checkpoint").exists():
+        return False
+    with rows.open("r+b") as file:
+        first = file.read(1)
+        file.seek(0)
+        file.write(bytes([first[0] ^ 1]))
+    return True
 
 
 def _remove(folder: Path) -> None:

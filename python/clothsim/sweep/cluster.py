@@ -106,7 +106,7 @@ class LocalCluster(Cluster):
             {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-saturation": 1.0}
         ):
             self._scheduler = Scheduler(
-                n_workers=0, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50,
+                n_workers=0, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0", silence_logs=50,
                 host="127.0.0.1",
             )  # fmt: skip
         super().__init__(Client(self._scheduler, set_as_default=False))

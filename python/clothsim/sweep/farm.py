@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import queue
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -16,6 +18,7 @@ __all__ = ["run_all"]
 
 _AHEAD = 3  # runs that wait at the scheduler for each that is under way
 _TICK = 0.2  # s
+_GATHER = 5.0  # s for a result to come over
 _ALONE = 120.0  # s without a worker after which nobody is expected to come
 
 
@@ -115,8 +118,10 @@ class _Farm:
         run, _ = self._open.pop(future.key, (None, None))
         if run is None:
             return
-        if future.status == "finished":
-            facts = dict(future.result())
+        if future.status in ("finished", "pending"):
+            facts = self._facts(run, future)
+            if facts is None:
+                return
             facts.setdefault("starts", 1 + self._losses.get(run.number, 0))
             facts["losses"] = self._losses.get(run.number, 0)
             self._done(run, facts)
@@ -133,6 +138,21 @@ class _Farm:
             raise ClusterError(f"a worker cannot run clothsim: {error}: install the same version there") from error
         else:
             self._done(run, {"error": str(error) or type(error).__name__, "error_type": type(error).__name__})
+
+    def _facts(self, run: Run, future: Any) -> dict[str, Any] | None:
+        """The result of a run; None if it was lost with its worker after all, and the scheduler makes it anew.
+
+        It is not waited for: where no worker is left, somebody has to go on looking after them.
+        """
+        found = task.read_result(self._work.result(run.name))
+        if found is None and future.status == "finished":
+            with contextlib.suppress(TimeoutError, asyncio.TimeoutError):
+                found = dict(future.result(timeout=_GATHER))
+        if found is None:
+            self._open[future.key] = (run, future)
+            self._cluster.look_after()
+            future.add_done_callback(self._ended.put)
+        return found
 
     def _start_again(self, run: Run) -> None:
         self._losses[run.number] = times = self._losses.get(run.number, 0) + 1

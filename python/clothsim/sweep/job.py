@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from clothsim._files import write_whole
-from clothsim.errors import InvalidInput
+from clothsim.errors import ClusterError, InvalidInput
 from clothsim.simulation import progress_bar
 from clothsim.study import machine
 from clothsim.study.points import label
@@ -24,6 +26,8 @@ from clothsim.sweep.request import Request, Run
 from clothsim.sweep.task import read_result
 
 __all__ = ["RETRIES", "Options", "Sweep", "load", "run"]
+
+_logger = logging.getLogger(__name__)
 
 RETRIES = 3
 
@@ -107,7 +111,8 @@ def run(request: Request, out: Path | None, options: Options) -> Sweep | dict[st
             return complete
         with folder.locked():
             folder.claim(request.digest, overwrite=options.overwrite)
-            results, cluster = _results(request, folder, options, retries)
+            with _nothing_left(folder):
+                results, cluster = _results(request, folder, options, retries)
             facts = {
                 **request.facts(), "command": options.command, "machine": machine.facts(), **cluster,
                 "seconds": round(time.monotonic() - started, 1), **_counts(results), "files": [],
@@ -125,6 +130,19 @@ def _folder(out: Path | None) -> Iterator[SweepFolder]:
         return
     with tempfile.TemporaryDirectory(prefix="clothsim-sweep-") as name:
         yield SweepFolder(Path(name) / "out")
+
+
+@contextlib.contextmanager
+def _nothing_left(folder: SweepFolder) -> Iterator[None]:
+    """A sweep that has not begun, as there is no cluster, leaves no unfinished one behind."""
+    try:
+        yield
+    except ClusterError:
+        if not any((folder.work / "results").iterdir()) and not any((folder.work / "runs").iterdir()):
+            folder.remove_work()
+            with contextlib.suppress(OSError):
+                folder.out.rmdir()
+        raise
 
 
 def _results(
@@ -157,7 +175,10 @@ def _results(
         nonlocal again
         again += 1
         bar.set_postfix_str(f"{again} started again")
-        bar.write(f"run {one.number} ({label(one.settings)}): its worker was lost; it goes on with another one")
+        text = f"run {one.number} ({label(one.settings)}): its worker was lost; it goes on with another one"
+        _logger.warning("%s", text)
+        if options.progress:
+            bar.write(text, file=sys.stderr)
 
     cluster_facts: dict[str, Any] = {"scheduler": options.scheduler, "workers": 0, "started_again": 0}
     try:
