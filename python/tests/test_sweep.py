@@ -6,13 +6,12 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT, RunCli, cli_command
+from conftest import RunCli, cli_command
 
 import clothsim as cs
 from clothsim._cli import main
@@ -375,27 +374,3 @@ def test_several_scenes(tmp_path: Path, scheduler: str) -> None:
     rows = cs.sweep.run_file(write(tmp_path, text), scheduler=scheduler, progress=False).rows()
     assert [row["scene"] for row in rows] == ["a.toml", "b.toml"]
     assert [row["steps"] for row in rows] == [4, 4] or rows[0]["steps"] == rows[1]["steps"]
-
-
-def test_the_pages_run_from_top_to_bottom(tmp_path: Path) -> None:
-    """Sweep file, commands and Python of the page on sweeps, then the Python of the page on reliability."""
-    napkin = SMALL.replace("[scene]\n", "").replace("[scene.", "[").replace("[[scene.", "[[")
-    (tmp_path / "napkin.toml").write_text(napkin)
-    script = ["import subprocess, sys", "def main():"]
-    for page in ("sweep", "reliability"):
-        parts = (ROOT / "docs" / f"{page}.md").read_text().split("```")
-        for kind, text in (tuple(part.split("\n", 1)) for part in parts[1::2]):
-            if kind == "toml":
-                (tmp_path / "napkins.toml").write_text(text.replace("duration = 0.2", "duration = 0.02"))
-            elif kind == "sh":
-                commands = [line.split() for line in text.splitlines()]
-                script += [f"    subprocess.run([sys.executable, '-m', *{c!r}], check=True)" for c in commands]
-            elif kind == "python":
-                script += ["    " + line for line in text.splitlines()]
-    script += ["main()"]
-    done = subprocess.run(
-        [sys.executable, "-c", "\n".join(script)], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "napkins: 8 runs" in done.stdout
-    assert "frames of silk" in done.stdout
