@@ -32,6 +32,11 @@ def distributions() -> dict[str, str]:
 def load(folder: str | os.PathLike[str]) -> Sweep:
     """Read a sweep that was written into a folder.
 
+    Parameters
+    ----------
+    folder : path
+        What was ``out``.
+
     Raises
     ------
     InvalidInput
@@ -151,7 +156,17 @@ def run_file(
     overwrite: bool = False,
     progress: bool = True,
 ) -> Sweep:
-    """Run what a sweep file (TOML) asks for; parameters and errors as for `run`."""
+    """Run what a sweep file (TOML) asks for; it returns and raises what `run` does.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    fixed : mapping, optional
+        Values for all runs, before those of the file's ``[set]``.
+    processes, scheduler, out, resume, overwrite, progress
+        As for `run`.
+    """
     from clothsim.sweep.file import read
 
     asked = read(path, fixed)
