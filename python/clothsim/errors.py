@@ -26,8 +26,21 @@ __all__ = [
 ]
 
 
+# A message quotes what came, which can be a megabyte of a damaged file: head and tail of it say enough.
+_HEAD, _TAIL = 1000, 400
+
+
+def _bearable(text: object) -> object:
+    if not isinstance(text, str) or len(text) <= _HEAD + _TAIL:
+        return text
+    return f"{text[:_HEAD]} … ({len(text) - _HEAD - _TAIL} characters) … {text[-_TAIL:]}"
+
+
 class ClothSimError(Exception):
-    """Base of every error that clothsim raises on purpose."""
+    """Base of every error that clothsim raises on purpose; its message is of bearable length."""
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*map(_bearable, args))
 
 
 class InvalidInput(ClothSimError, ValueError):
