@@ -18,7 +18,7 @@ __all__ = ["Pool", "Tally", "replay", "slice_of"]
 
 _ROOT = Path(__file__).resolve().parents[1]
 # A process runs one target so long [s]: it is started and warm in two, and what it leaks goes with it.
-SLICE = 20.0
+SLICE = 45.0
 
 
 @dataclass

@@ -16,7 +16,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 import clothsim as cs
-from clothsim import _session, collision
+from clothsim import _session, collision, mesh
 from clothsim.errors import ClothSimError
 from fuzz.target import Target, dump_json, load_json, refused
 
@@ -31,7 +31,8 @@ _SHAPES = [[], [0], [3], [0, 3], [3, 0], [4, 3], [4, 3], [4, 3], [2, 3], [4, 2],
            [0, 8, 3], [2, 3, 2], [2, 3, 3], [1, 1, 1, 1]]  # fmt: skip
 _PLAIN: list[Any] = [
     None, True, 0, 1, -1, 2, 7, 10**400, 2**63, 0.5, -0.5, 1e308, "nan", "inf", "-inf", "", "x", "bvh", "auto", [],
-    [[]], {}, [[0, 1, 2]], [[0, 1, "2"]], [[0, 1], [2]], {"a": 1}, "object", "bytes", "complex", "hysteresis", "coulomb",
+    [[]], {}, [[0, 1, 2]], [[0, 1, "2"]], [[0, 1], [2]], {"a": 1}, "object", "bytes", "complex", "hysteresis",
+    "coulomb",
 ]  # fmt: skip
 
 _ARRAY = st.fixed_dictionaries({
@@ -182,6 +183,7 @@ def check(case: dict[str, Any]) -> None:
 def plant() -> Iterator[None]:
     """A conversion that takes any array for contiguous float64."""
     with (
+        mock.patch.object(mesh, "floats", lambda value, *_: np.asarray(value)),
         mock.patch.object(collision, "floats", lambda value, *_: np.asarray(value)),
         mock.patch.object(_session, "floats", lambda value, *_: np.asarray(value)),
     ):

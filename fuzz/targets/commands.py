@@ -41,6 +41,9 @@ in_plane = { model = "spring", stiffness = 10.0 }
 bending = { model = "hinge", rigidity = 1e-6 }
 [output]
 fps = 100
+usd = false
+film_strip = false
+plots = false
 """
 _WORDS = ["scene.toml", "none.toml", ".", "out", "out/frames.npz", "drape", "cotton", "4.7", "bowline", "0", "1",
           "-1", "1e400", "nan",

@@ -2,8 +2,8 @@
 
 A scene is refused by name, or runs; a step is taken, or refused by an error that leaves a state. Always: finite
 numbers; no intersections where there were none and contact is on; the same bits with two threads, and from a
-checkpoint written in mid-run; pinned vertices of which nobody asks anything stay where they are; energies that are numbers, none negative
-that cannot be; a report that counts the steps.
+checkpoint written in mid-run; pinned vertices of which nobody asks anything stay where they are; energies that are
+numbers, none negative that cannot be; a report that counts the steps.
 """
 
 from __future__ import annotations

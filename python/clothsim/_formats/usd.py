@@ -200,5 +200,6 @@ class _Part:
                 kind="topology",
             )
         matrix = np.array(cache.GetLocalToWorldTransform(self._prim), dtype=np.float64)
-        moved: Floats = points @ matrix[:3, :3] + matrix[3, :3]
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused for the whole frame
+            moved: Floats = points @ matrix[:3, :3] + matrix[3, :3]
         return moved
