@@ -53,7 +53,12 @@ def _command(name: str, current: Path, *more: str) -> list[str]:
 def slice_of(name: str, current: Path, *more: str) -> list[dict[str, Any]]:
     """Facts that a process prints, and a finding made of its death where it died."""
     process = subprocess.Popen(
-        _command(name, current, *more), cwd=_ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        _command(name, current, *more),
+        cwd=_ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
     )
     return _facts(process, current)
 
@@ -139,7 +144,13 @@ class Pool:
         command = _command(name, current, "--seconds", str(seconds), "--seed", str(seed))
         environment = {**os.environ, "PYTHONWARNINGS": "ignore"}
         process = subprocess.Popen(
-            command, cwd=_ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+            command,
+            cwd=_ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            env=environment,
         )
         return {process: (name, current, self.elapsed)}
 
