@@ -30,17 +30,13 @@ __all__ = [
 _HEAD, _TAIL = 1000, 400
 
 
-def _bearable(text: object) -> object:
-    if not isinstance(text, str) or len(text) <= _HEAD + _TAIL:
-        return text
-    return f"{text[:_HEAD]} … ({len(text) - _HEAD - _TAIL} characters) … {text[-_TAIL:]}"
-
-
 class ClothSimError(Exception):
-    """Base of every error that clothsim raises on purpose; its message is of bearable length."""
+    """Base of every error that clothsim raises on purpose; as text of bearable length."""
 
-    def __init__(self, *args: object) -> None:
-        super().__init__(*map(_bearable, args))
+    def __str__(self) -> str:
+        text = super().__str__()
+        left = len(text) - _HEAD - _TAIL
+        return text if left <= 0 else f"{text[:_HEAD]} … ({left} characters) … {text[-_TAIL:]}"
 
 
 class InvalidInput(ClothSimError, ValueError):

@@ -66,14 +66,12 @@ impl SceneError {
 }
 
 /// A text of a message; what came can be a megabyte of a damaged file.
-fn bearable(mut text: String) -> String {
+fn bearable(text: String) -> String {
     const MOST: usize = 300;
-    if let Some((at, _)) = text.char_indices().nth(MOST) {
-        let left = text.len() - at;
-        text.truncate(at);
-        text.push_str(&format!("… ({left} bytes more)"));
+    match text.char_indices().nth(MOST) {
+        Some((at, _)) => format!("{}… ({} bytes more)", &text[..at], text.len() - at),
+        None => text,
     }
-    text
 }
 
 /// The known name that is fewest edits away, if that is at most a third of its length (at least two edits).
