@@ -33,7 +33,7 @@ def target() -> Target:
     )  # fmt: skip
     return Target(
         "animations", "animated meshes: glTF, USD, NPZ", st.one_of(gltf_files(), gltf_files(), archives, usd_files()),
-        check, lambda case: (case.suffix, case.content), File, plant, quick=300,
+        check, lambda case: (case.suffix, case.content), File, plant, quick=200,
     )  # fmt: skip
 
 

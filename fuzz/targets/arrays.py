@@ -159,7 +159,7 @@ def target() -> Target:
     return Target(
         "arrays", "arguments of the Python functions: types, shapes, layouts, values", cases, check, dump_json,
         load_json,
-        plant, quick=1000,
+        plant, quick=500,
     )  # fmt: skip
 
 

@@ -112,7 +112,7 @@ def target() -> Target:
         dump_json,
         load_json,
         plant,
-        quick=300,
+        quick=200,
     )
 
 

@@ -69,7 +69,7 @@ def target() -> Target:
     """Detection."""
     return Target(
         "detection", "detect and self_intersections against brute force", _cases(), check, dump_json, load_json, plant,
-        quick=400, seconds=60.0,
+        quick=250, seconds=60.0,
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ def target() -> Target:
     return Target(
         "meshes", "mesh files: OBJ, PLY, STL, glTF, USD", st.one_of(small, small, small, _LARGE, gltf_files(),
         usd_files()),
-        check, lambda case: (case.suffix, case.content), File, plant, quick=400,
+        check, lambda case: (case.suffix, case.content), File, plant, quick=200,
     )  # fmt: skip
 
 

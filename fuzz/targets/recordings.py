@@ -38,7 +38,7 @@ def target() -> Target:
             st.sampled_from([zipfile.ZIP_STORED, zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED]), edits(2),
             st.sampled_from([None, None, None, *members]),
         ),
-        check, lambda case: (case.suffix, case.content), File, plant, quick=250,
+        check, lambda case: (case.suffix, case.content), File, plant, quick=150,
     )  # fmt: skip
 
 

@@ -43,7 +43,7 @@ def target() -> Target:
             _DEEP.map(lambda text: File(".toml", text.encode())),
             _DEEP_JSON.map(lambda text: File(".json", text.encode())),
         ),
-        check, lambda case: (case.suffix, case.content), File, plant, quick=600, seconds=5.0,
+        check, lambda case: (case.suffix, case.content), File, plant, quick=300, seconds=5.0,
     )  # fmt: skip
 
 
