@@ -35,6 +35,7 @@ OUTPUTS = (
     "vtk",
     "film_strip.png",
     "plots.png",
+    "view.html",
     "report.json",
     "last_good.checkpoint",
 )
