@@ -5,6 +5,9 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clothsim._arrays import optional
-from clothsim._files import output_error, replacing, whole_folder, write_whole
+from clothsim._files import replacing, whole_folder, write_whole
 from clothsim._view.fields import Fields
 from clothsim._view.overlay import annotated
 from clothsim._view.source import Source
@@ -104,7 +107,7 @@ def write_film(
     Raises
     ------
     MissingDependency
-        An MP4 needs the package imageio-ffmpeg, which brings ffmpeg.
+        An MP4 needs ffmpeg, which the package imageio-ffmpeg brings.
     OutputError
         It cannot be written; what was there before is intact.
     """
@@ -112,7 +115,7 @@ def write_film(
     suffix = path.suffix.lower()
     _check_folder(path)
     if suffix == ".mp4":
-        optional("imageio_ffmpeg", extra="view", purpose="writing MP4 films (a .gif or a folder of pictures does not)")
+        _ffmpeg()
         size = (size[0] - size[0] % 2, size[1] - size[1] % 2)  # H.264 halves its colours
     if suffix == ".gif":
         fps = 100.0 / max(2, round(100.0 / min(fps, _GIF_FASTEST)))
@@ -158,22 +161,40 @@ def _gif(images: Any, path: Path, pictures: Iterator[NDArray[np.uint8]], fps: fl
         )  # fmt: skip
 
 
+def _ffmpeg() -> str:
+    """Path of ffmpeg: the system's, else the one that imageio-ffmpeg brings."""
+    found = shutil.which("ffmpeg")
+    purpose = "writing MP4 films without ffmpeg on the PATH (a .gif or a folder of pictures needs neither)"
+    return found or str(optional("imageio_ffmpeg", extra="view", purpose=purpose).get_ffmpeg_exe())
+
+
 def _mp4(path: Path, pictures: Iterator[NDArray[np.uint8]], size: tuple[int, int], fps: float) -> None:
-    ffmpeg = optional("imageio_ffmpeg", extra="view", purpose="writing MP4 films")
-    with replacing(path) as part:
-        # CRF 18: no loss that one sees. faststart: plays in a browser before it is all there.
-        writer = ffmpeg.write_frames(
-            str(part), size, fps=fps, codec="libx264", quality=None, macro_block_size=2, ffmpeg_log_level="error",
-            output_params=["-crf", "18", "-preset", "medium", "-movflags", "+faststart"],
-        )  # fmt: skip
+    # CRF 18: no loss that one sees. faststart: plays in a browser before it is all there.
+    command = [
+        _ffmpeg(), "-v", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}",
+        "-r", f"{fps:g}", "-i", "-", "-an", "-c:v", "libx264", "-crf", "18", "-preset", "medium",
+        "-pix_fmt", "yuv420p", "-movflags", "+faststart",
+    ]  # fmt: skip
+    with replacing(path) as part, tempfile.TemporaryFile() as said:
+        # A session of its own: Ctrl-C stops the drawing here, and what ffmpeg has is thrown away.
+        process = subprocess.Popen([*command, str(part)], stdin=subprocess.PIPE, stderr=said, start_new_session=True)
+        is_whole = False
         try:
-            writer.send(None)
-            for picture in pictures:
-                writer.send(np.ascontiguousarray(picture))
-        except OSError as error:  # ffmpeg is gone: the disk is full, or it was killed
-            raise output_error(path, error) from error
+            assert process.stdin is not None
+            with process.stdin as stdin:
+                for picture in pictures:
+                    with contextlib.suppress(BrokenPipeError):  # ffmpeg is gone: it says why below
+                        stdin.write(np.ascontiguousarray(picture).data)
+                    if process.poll() is not None:
+                        break
+            is_whole = process.wait() == 0
         finally:
-            with contextlib.suppress(OSError, RuntimeError):
-                writer.close()
-        if not part.exists() or part.stat().st_size == 0:
-            raise OutputError(5, f"cannot write {path}: ffmpeg wrote nothing")
+            if process.poll() is None:
+                process.kill()
+            process.wait()
+        if not is_whole:
+            said.seek(0)
+            reason = said.read().decode(errors="replace").strip().splitlines() or [
+                f"it ended with {process.returncode}"
+            ]
+            raise OutputError(5, f"cannot write {path}: ffmpeg: {reason[-1]}")

@@ -73,8 +73,9 @@ class Plot {
       c.lineTo(width, Math.round(y(v)) + 0.5);
       c.stroke();
     }
-    c.fillText(short(high), 3, y(high) + 11);
-    if (low < 0) c.fillText(short(low), 3, y(low) - 3);
+    c.textAlign = "right";
+    c.fillText(short(high), width - 3, y(high) + 11);
+    if (low < 0) c.fillText(short(low), width - 3, y(low) - 3);
     for (const series of this.spec.series) {
       c.strokeStyle = series.colour === "ink" ? theme.ink : series.colour;
       c.lineWidth = 1.6;
