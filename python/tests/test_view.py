@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT, SCENE, RunCli
+from conftest import SCENE, RunCli
 from view_runs import falling, small_run
 
 import clothsim as cs
@@ -355,19 +355,6 @@ def test_a_missing_package_is_named(
     assert "needs the package" in said
     assert "pip install 'clothsim[" in said
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_commands_of_the_documentation_run(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    block = (ROOT / "docs" / "view.md").read_text().split("```sh\n")[1].split("```")[0]
-    commands = [line.split("#")[0].split() for line in block.splitlines()]
-    assert [words[:3] for words in commands] == [["clothsim", "view", "out/demo"]] * 4
-    shutil.copytree(run, tmp_path / "out" / "demo")
-    monkeypatch.chdir(tmp_path)
-    for words in commands:
-        shorter = {"100": "10", "640x400": "160x100"}  # the small run has 16 frames
-        assert _cli.main([shorter.get(word, word) for word in words[1:]]) == 0
-    assert {p.name for p in tmp_path.iterdir()} == {"out", "strain.png", "drape.mp4", "energy.svg"}
-    assert (tmp_path / "out" / "demo" / "view.html").stat().st_size > 50_000
 
 
 def test_help_has_examples(run_cli: RunCli) -> None:
