@@ -174,8 +174,17 @@ class Recording:
     def rest(self, body: Body | str) -> Floats | None:
         """Undeformed shape of a cloth: corners of each triangle in a plane of its own [m], shape (m, 3, 2).
 
-        Lengths and angles count; where and how a triangle lies in its plane does not. None for a collider, or where the
-        undeformed shape is not known.
+        Lengths and angles count; where and how a triangle lies in its plane does not.
+
+        Parameters
+        ----------
+        body : Body or str
+            The cloth, or its name.
+
+        Returns
+        -------
+        (m, 3, 2) float64 or None
+            None for a collider, or where the undeformed shape is not known.
         """
         found = self.body(body) if isinstance(body, str) else body
         if found.kind != "cloth" or found.rest is None:
