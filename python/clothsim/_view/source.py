@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from clothsim._run.folder import RunFolder
+from clothsim._run.folder import RunFolder, read_checkpoint
+from clothsim._run.frames import frames_so_far
 from clothsim._scene_facts import contact_thickness
 from clothsim.errors import CheckpointError, InvalidInput
 from clothsim.recording import Recording
@@ -124,11 +126,10 @@ class Source:
     @classmethod
     def _unfinished(cls, folder: RunFolder) -> Source:
         """Read the frames so far; meshes and names come from the checkpoint. Nothing is written or locked."""
-        found = folder.load_checkpoint()
-        if found is None:
+        if not folder.has_checkpoint:
             got = "a run that has just begun: look again after its first checkpoint (output.checkpoint_interval)"
             raise _wrong(folder.out, "a run with a checkpoint or finished", got)
-        header, engine = found
+        header, engine = _last_whole(folder)
         simulation = Simulation._from_bytes(engine, 1, "cpu")
         scene = json.loads(simulation._core.scene())
         # A run that goes on from another one has that frame's fingerprint behind its scene's.
@@ -138,15 +139,8 @@ class Source:
         cloth = sum(b.vertex_count for b in bodies if b.kind == "cloth")
         has_velocities = bool(scene["output"]["velocities"])
         width = moving + cloth * has_velocities
-        lines = (folder.work / "frames.jsonl").read_bytes().split(b"\n")[:-1]
-        rows = np.fromfile(folder.work / "frames.bin", dtype="<f8")
-        count = min(len(lines), len(rows) // (3 * width)) if width else 0
-        try:
-            facts = [json.loads(line) for line in lines[:count]]
-            times = np.array([fact["time"] for fact in facts], dtype=np.float64)
-        except (ValueError, KeyError, TypeError) as error:
-            raise CheckpointError(f"{folder.work / 'frames.jsonl'}: expected a line per frame, got {error}") from error
-        frames = rows[: count * 3 * width].reshape(count, width, 3)
+        frames, facts = frames_so_far(folder.work, width)
+        count, times = len(facts), np.array([fact["time"] for fact in facts], dtype=np.float64)
         recording = Recording(
             bodies, times, frames[:, :moving], standing_positions(bodies, simulation.collider_positions),
             velocities=frames[:, moving:] if has_velocities else None, fps=float(scene["output"]["fps"]),
@@ -154,6 +148,15 @@ class Source:
         )  # fmt: skip
         end = f"{times[-1]:g} of {scene['duration']:g} s" if count else "nothing yet"
         return cls(folder.out, recording, facts, notices=[f"the run is not finished: {count} frames so far ({end})"])
+
+
+def _last_whole(folder: RunFolder) -> tuple[dict[str, Any], bytes]:
+    """Return the last checkpoint that can be read, or say what is wrong with the oldest."""
+    *newer, oldest = folder.checkpoints()
+    for path in newer:
+        with contextlib.suppress(CheckpointError):
+            return read_checkpoint(path)
+    return read_checkpoint(oldest)
 
 
 def _wrong(path: Path, expected: str, got: str) -> InvalidInput:
