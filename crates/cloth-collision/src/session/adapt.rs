@@ -41,7 +41,8 @@ pub(super) struct Adaptation {
     /// No motion has been seen.
     is_fresh: bool,
     is_growing: bool,
-    has_turned: bool,
+    /// How often n_f has turned round.
+    turns: u32,
     previous: Option<f64>,
     /// Cost of a frame alone.
     alone: Option<f64>,
@@ -63,7 +64,7 @@ impl Adaptation {
             frames,
             is_fresh: matches!(rule, Frames::Adaptive { .. }),
             is_growing: true,
-            has_turned: false,
+            turns: 0,
             previous: None,
             alone: None,
             since_alone: 0,
@@ -138,7 +139,7 @@ impl Adaptation {
             let lasted = self.count;
             self.session_ends();
             self.frames = self.frames.min(lasted);
-            (self.is_growing, self.has_turned) = (false, true);
+            (self.is_growing, self.turns) = (false, self.turns.saturating_add(1));
         }
         is_worse
     }
@@ -157,9 +158,9 @@ impl Adaptation {
         let average = self.cost / f64::from(self.count);
         self.count = 0;
         if self.previous.is_some_and(|previous| average > WORSE * previous) {
-            (self.is_growing, self.has_turned) = (!self.is_growing, true);
+            (self.is_growing, self.turns) = (!self.is_growing, self.turns.saturating_add(1));
         }
-        let falls = !self.has_turned && self.previous.is_some_and(|previous| average < FALLS * previous);
+        let falls = self.turns == 0 && self.previous.is_some_and(|previous| average < FALLS * previous);
         self.previous = Some(average);
         let is_sure = self.alone.is_some() && self.since_alone < SURE.max(2 * self.frames);
         let pays = self.alone.is_none_or(|alone| average < alone);
@@ -185,7 +186,7 @@ impl Adaptation {
             self.paused = self.pause;
             self.pause = (2 * self.pause).min(PAUSE[1]);
             self.previous = None;
-            (self.is_growing, self.has_turned) = (true, false);
+            (self.is_growing, self.turns) = (true, 0);
             self.frames = 2.min(most);
         }
     }
