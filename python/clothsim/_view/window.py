@@ -100,7 +100,7 @@ class Window:
         if last > 0:
             self._slider = plotter.add_slider_widget(
                 self._scrub, [0, last], value=frame, title="", fmt="%.0f", color=_INK, interaction_event="always",
-                pointa=(0.28, 0.06), pointb=(0.96, 0.06), slider_width=0.014, tube_width=0.003,
+                pointa=(0.28, 0.1), pointb=(0.96, 0.1), slider_width=0.014, tube_width=0.003,
             )  # fmt: skip
         plotter.add_text(_KEYS, position=(14, 10), font_size=8, color="#8a857e", name="keys")
         for key, action in {
@@ -181,7 +181,7 @@ class Window:
             mapper.lookup_table = lookup
             plotter.add_scalar_bar(
                 f"{found.label} [{found.unit}]", mapper=mapper, vertical=True, n_labels=5, fmt="%.3g", color=_INK,
-                position_x=0.02, position_y=0.25, width=0.05, height=0.5, title_font_size=14, label_font_size=12,
+                position_x=0.08, position_y=0.25, width=0.05, height=0.5, title_font_size=14, label_font_size=12,
                 render=False,
             )  # fmt: skip
 
