@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class RecordedBody:
     triangles: Ints
     uv: Floats | None
     static: bool
+    rest: Literal["uv", "start"] | Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,7 @@ class Recorded:
     fps: float
     up: str
     name: str
+    thickness: float | None
 
 
 def read(path: Path) -> Recorded:
@@ -78,7 +80,7 @@ def read(path: Path) -> Recorded:
     # The cloths come first in the arrays, whatever the order of the list.
     return Recorded(
         bodies, times, np.concatenate(moving, axis=1), np.concatenate(standing), velocities, float(meta["fps"]),
-        meta["up"], meta["name"],
+        meta["up"], meta["name"], None if meta.get("thickness") is None else float(meta["thickness"]),
     )  # fmt: skip
 
 
@@ -98,13 +100,18 @@ def _meta(data: Archive) -> Mapping[str, Any]:
                 raise ValueError(f"meta: fps: expected a finite number > 0, got {fps}")
         case _:
             raise ValueError("meta: expected format, name, fps, up and bodies")
+    thickness = meta.get("thickness")
+    if thickness is not None and not (type(thickness) in (int, float) and 0.0 <= thickness < math.inf):
+        raise ValueError(f"meta: thickness: expected a finite number ≥ 0 or none, got {str(thickness)[:200]}")
     for at, entry in enumerate(bodies):
         match entry:
             case {
                 "name": str(_), "kind": "cloth" | "collider", "vertex_count": int(n), "triangle_count": int(m),
                 "static": bool(_), "uv": bool(_),
             } if n >= 0 and m >= 0:  # fmt: skip
-                pass
+                if entry.get("rest") not in (None, "uv", "start", "array"):
+                    got = str(entry["rest"])[:200]
+                    raise ValueError(f"meta: bodies[{at}]: rest: expected uv, start, array or none, got {got}")
             case _:
                 raise ValueError(
                     f"meta: bodies[{at}]: expected name, kind, vertex_count, triangle_count, static and uv, "
@@ -146,10 +153,13 @@ def _cloths(data: Archive, entries: list[Mapping[str, Any]]) -> list[RecordedBod
         own = triangles[row : row + m] - vertex
         if own.size and (own.min() < 0 or own.max() >= n):
             raise ValueError(f"triangles: expected those of {entry['name']!r} to have its own vertices")
-        bodies.append(
-            RecordedBody(
-                entry["name"], "cloth", n, own, uv[row : row + m] if uv is not None and entry["uv"] else None, False
-            )
-        )
+        rest = entry.get("rest")
+        if rest == "array":
+            name = f"rest_{len(bodies)}"
+            rest = floats(data[name], name, "shape (m, 3, 2)")
+            if rest.shape != (m, 3, 2) or not np.isfinite(rest).all():
+                raise ValueError(f"{name}: expected finite numbers of shape {(m, 3, 2)}, got shape {rest.shape}")
+        own_uv = uv[row : row + m] if uv is not None and entry["uv"] else None
+        bodies.append(RecordedBody(entry["name"], "cloth", n, own, own_uv, False, rest))
         vertex, row = vertex + n, row + m
     return bodies
