@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +33,8 @@ from clothsim.scene import Scene
 from clothsim.simulation import Simulation, frame_lengths, moving_positions, progress_bar, standing_positions
 
 __all__ = ["Job", "Stopped"]
+
+_logger = logging.getLogger(__name__)
 
 
 class Stopped(Exception):
@@ -168,9 +170,9 @@ class Job:
         if not self.resume:
             folder.clear_work()
         header, simulation = self._start(folder, fingerprint, simulation)
-        if self.progress and header["frames"] == 0:
+        if header["frames"] == 0:
             for warning in simulation.plan["warnings"]:
-                print(f"warning: {warning}", file=sys.stderr)
+                _logger.warning("%s", warning)
         fps = float(settings["fps"])
         lengths = self._lengths()
         bodies = simulation.bodies
