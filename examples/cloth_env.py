@@ -116,7 +116,7 @@ class FoldTowel(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         back = pv.Property(color="#c98f6a", diffuse=0.8, ambient=0.25)
         plotter.add_mesh(normals, color="#9c2f35", smooth_shading=True, ambient=0.25, backface_params=back)
         table = pv.Plane(center=(0.0, -0.002, 0.0), direction=(0.0, 1.0, 0.0), i_size=1.0, j_size=1.0)
-        plotter.add_mesh(table, color="#b4b9c2", ambient=0.1, diffuse=0.7, specular=0.0)
+        plotter.add_mesh(table, color="#d9dce1", ambient=0.15, diffuse=0.75, specular=0.0)
         for pin in self._sim.positions[list(self._held())]:
             plotter.add_mesh(pv.Sphere(radius=0.008, center=pin), color="#343230")
         plotter.camera_position = [(0.25, 0.42, 0.6), (-0.02, 0.02, 0.0), (0.0, 1.0, 0.0)]

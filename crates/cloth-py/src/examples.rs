@@ -3,12 +3,13 @@
 use pyo3::prelude::*;
 
 /// Name and text of each scene in `examples/` that needs no other file.
-const SCENES: [(&str, &str); 9] = [
+const SCENES: [(&str, &str); 10] = [
     ("cantilever", include_str!("../../../examples/cantilever.toml")),
     ("crease", include_str!("../../../examples/crease.toml")),
     ("drape", include_str!("../../../examples/drape.toml")),
     ("flag", include_str!("../../../examples/flag.toml")),
     ("hanging", include_str!("../../../examples/hanging.toml")),
+    ("napkin", include_str!("../../../examples/napkin.toml")),
     ("pinned_turn", include_str!("../../../examples/pinned_turn.toml")),
     ("ringing", include_str!("../../../examples/ringing.toml")),
     ("slope", include_str!("../../../examples/slope.toml")),
