@@ -216,7 +216,15 @@ class DeviceError(ClothSimError, RuntimeError):
 
 
 class GpuUnavailable(DeviceError):
-    """A GPU was asked for, and there is none that can be used."""
+    """A GPU was asked for, and there is none that can be used.
+
+    Parameters
+    ----------
+    message : str
+        What is missing, and what to do.
+    device : str
+        The adapter with its driver, where there is one.
+    """
 
 
 class MissingDependency(ClothSimError, ImportError):
