@@ -15,12 +15,13 @@ Examples
 
 import logging as _logging
 
-from clothsim import bending, collision, errors, friction, stability, study
+from clothsim import bending, collision, errors, friction, stability, study, sweep
 from clothsim._core import __version__
 from clothsim.animation import Animation
 from clothsim.errors import (
     CheckpointError,
     ClothSimError,
+    ClusterError,
     DeviceError,
     GpuUnavailable,
     IntersectingStart,
@@ -47,6 +48,7 @@ __all__ = [
     "Body",
     "CheckpointError",
     "ClothSimError",
+    "ClusterError",
     "DeviceError",
     "Fabric",
     "Frame",
@@ -76,4 +78,5 @@ __all__ = [
     "record",
     "stability",
     "study",
+    "sweep",
 ]

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 __all__ = [
     "CheckpointError",
     "ClothSimError",
+    "ClusterError",
     "DeviceError",
     "GpuUnavailable",
     "IntersectingStart",
@@ -225,6 +226,10 @@ class GpuUnavailable(DeviceError):
     device : str
         The adapter with its driver, where there is one.
     """
+
+
+class ClusterError(ClothSimError, ConnectionError):
+    """The workers of a sweep cannot be reached, or do not start; what has finished is kept."""
 
 
 class MissingDependency(ClothSimError, ImportError):

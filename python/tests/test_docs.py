@@ -47,7 +47,7 @@ def test_the_stub_says_what_the_module_has() -> None:
 
 
 def test_importing_is_light() -> None:
-    heavy = {"matplotlib", "pyvista", "vtk", "vtkmodules", "pxr", "trimesh", "tqdm", "PIL"}
+    heavy = {"matplotlib", "pyvista", "vtk", "vtkmodules", "pxr", "trimesh", "tqdm", "PIL", "distributed", "pyarrow"}
     code = "import sys, clothsim, clothsim._cli; print(*sorted({m.split('.')[0] for m in sys.modules}))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert heavy.isdisjoint(loaded)
@@ -75,6 +75,7 @@ def test_every_error_has_its_place_in_the_tree() -> None:
         "SolverFailed": (cs.ClothSimError,),
         "DeviceError": (cs.ClothSimError, RuntimeError),
         "GpuUnavailable": (cs.DeviceError,),
+        "ClusterError": (cs.ClothSimError, ConnectionError),
         "MissingDependency": (cs.ClothSimError, ImportError),
         "OutputError": (cs.ClothSimError, OSError),
         "OutputExists": (cs.ClothSimError, FileExistsError),

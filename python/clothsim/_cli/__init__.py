@@ -21,6 +21,7 @@ from clothsim._cli import (
     schema,
     stability,
     study,
+    sweep,
     tune,
 )
 from clothsim._cli.logs import add_verbose, show_logs
@@ -29,7 +30,21 @@ from clothsim.errors import ClothSimError, GpuUnavailable, MissingDependency, Ou
 
 __all__ = ["build_parser", "main"]
 
-_COMMANDS = (run, plan, example, export, study, tune, stability, reproduce, materials, doctor, schema, completion)
+_COMMANDS = (
+    run,
+    plan,
+    example,
+    export,
+    study,
+    tune,
+    sweep,
+    stability,
+    reproduce,
+    materials,
+    doctor,
+    schema,
+    completion,
+)
 
 # Exit codes: what was asked for cannot be done / what was asked for is wrong.
 _FAILED, _BAD_INPUT = 1, 2
