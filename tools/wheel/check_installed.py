@@ -26,7 +26,7 @@ VERSIONS = ("3.10", "3.11", "3.12", "3.13")
 EXTRAS = ("mesh", "usd", "view", "plot", "robot")
 # Tests that need neither Rust, nor the repository's folders, nor pictures.
 SUITE = (
-    "test_bending", "test_collision", "test_effects", "test_friction", "test_materials", "test_mesh", "test_recording",
+    "test_bending", "test_collision", "test_effects", "test_friction", "test_mesh", "test_recording",
     "test_restart", "test_scene", "test_session", "test_simulation", "test_steer",
 )  # fmt: skip
 TYPED = """
