@@ -23,6 +23,7 @@ from clothsim._cli import (
     study,
     sweep,
     tune,
+    view,
 )
 from clothsim._cli.logs import add_verbose, show_logs
 from clothsim._core import __version__
@@ -34,6 +35,7 @@ _COMMANDS = (
     run,
     plan,
     example,
+    view,
     export,
     study,
     tune,
