@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from clothsim import _core
+from clothsim._toml import tomllib
 from clothsim.errors import InvalidScene
 from fuzz.mutations import JUNK, damaged, damaged_tree, edits, tree_edits
 from fuzz.target import File, Target, refused

@@ -6,7 +6,6 @@ import contextlib
 import json
 import logging
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -207,9 +206,9 @@ class Job:
         if not self.resume:
             folder.clear_work()
         header, simulation, writer = self._start(folder, fingerprint, simulation)
-        if self.progress and header["frames"] == 0:
+        if header["frames"] == 0:
             for warning in simulation.plan["warnings"]:
-                print(f"warning: {warning}", file=sys.stderr)
+                _logger.warning("%s", warning)
         fps = float(settings["fps"])
         lengths = self._lengths()
         bodies = simulation.bodies if self.start is None else self.start.undeformed(simulation.bodies)
@@ -327,8 +326,6 @@ class Job:
             if damage:
                 text = f"{'; '.join(damage)}. Going on from the checkpoint before, at {resumed.time:g} s"
                 _logger.warning("%s", text)
-                if self.progress:
-                    print(f"warning: {text}", file=sys.stderr)
             return header, resumed, writer
         if damage:
             raise CheckpointError(f"{'; '.join(damage)}. There is no other checkpoint; --overwrite starts anew")
