@@ -147,7 +147,8 @@ def _cloths(data: Archive, entries: list[Mapping[str, Any]]) -> list[RecordedBod
         uv = floats(data["uv"], "uv", "shape (m, 3, 2)")
         if uv.shape != (rows, 3, 2):
             raise ValueError(f"uv: expected shape {(rows, 3, 2)}, got shape {uv.shape}")
-    bodies, vertex, row = [], 0, 0
+    bodies: list[RecordedBody] = []
+    vertex = row = 0
     for entry in entries:
         n, m = entry["vertex_count"], entry["triangle_count"]
         own = triangles[row : row + m] - vertex
