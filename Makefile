@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability docs pictures kills notebooks wheel wheel-test clean
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability fuzz docs pictures kills notebooks wheel wheel-test clean
 
 help: ## List the targets
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -90,6 +90,9 @@ blender: build ## Import what we write into headless Blender and compare every v
 
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
+
+fuzz: build ## Fuzz all that reads, detection and whole scenes (MINUTES=10); findings go to out/fuzz
+	$(BIN)/python -m fuzz --minutes $(or $(MINUTES),10)
 
 stability: build ## Run the stability atlas, every case over its whole map (minutes); writes stability/
 	$(BIN)/clothsim stability -o stability --overwrite

@@ -6,7 +6,6 @@ import io
 import json
 import os
 import zipfile
-import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from clothsim._arrays import Floats, Ints
+from clothsim._arrays import Floats, Ints, floats, number
 from clothsim._files import whole
 from clothsim.errors import InvalidInput
 
@@ -103,8 +102,8 @@ class Recording:
         thickness: float | None = None,
     ) -> None:
         self.bodies = tuple(bodies)
-        self.times = np.asarray(times, dtype=np.float64)
-        self.fps = float(fps)
+        self.times = floats(times, "times", "shape (frames,)")
+        self.fps = number(fps, "fps", "frames per second > 0")
         self.up = up
         self.name = name
         self.thickness = thickness
@@ -112,6 +111,12 @@ class Recording:
         self._standing = np.zeros((0, 3)) if standing is None else standing
         self._velocities = velocities
         self._slices = _slices(self.bodies)
+        if self.times.ndim != 1:
+            raise InvalidInput(f"times: expected shape (frames,), got shape {self.times.shape}", name="times")
+        for what, array in (("moving", moving), ("standing", self._standing), ("velocities", velocities)):
+            if array is not None and not (isinstance(array, np.ndarray) and array.dtype == np.float64):
+                got = str(getattr(array, "dtype", type(array).__name__))
+                raise InvalidInput(f"{what}: expected an array of float64, got {got}", name=what, got=got)
         expected = (len(self.times), sum(b.vertex_count for b in self.bodies if not b.static), 3)
         if moving.shape != expected:
             raise InvalidInput(f"moving: expected shape {expected}, got shape {moving.shape}", name="moving")
@@ -276,59 +281,29 @@ class Recording:
         InvalidInput
             The file cannot be read, is cut off or damaged, or holds something else; it is named.
         """
-        try:
-            return cls._load(path)
-        except (
-            OSError,
-            EOFError,
-            ValueError,
-            KeyError,
-            TypeError,
-            IndexError,
-            zipfile.BadZipFile,
-            zlib.error,
-        ) as error:
-            reason = getattr(error, "strerror", None) or (
-                f"{error.args[0]} is missing" if isinstance(error, KeyError) and error.args else str(error)
-            )
-            raise InvalidInput(f"{path}: not a recording that can be read: {reason}", name="path") from error
+        from clothsim._formats import recorded
 
-    @classmethod
-    def _load(cls, path: str | os.PathLike[str]) -> Recording:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
-            if not isinstance(data, np.lib.npyio.NpzFile):
-                raise ValueError("expected an archive of arrays (.npz), got one array")
-            meta = json.loads(str(data["meta"]))
-            if meta["format"] != _FORMAT:
-                raise ValueError(f"expected format {_FORMAT}, got {meta['format']!r}")
-            bodies: list[Body] = []
-            moving, standing = [data["positions"]], [np.zeros((0, 3))]
-            first_vertex = first_triangle = collider = 0
-            for entry in meta["bodies"]:
-                n, m = entry["vertex_count"], entry["triangle_count"]
-                if entry["kind"] == "cloth":
-                    rows = slice(first_triangle, first_triangle + m)
-                    uv = data["uv"][rows] if entry["uv"] else None
-                    rest = entry.get("rest")
-                    rest = data[f"rest_{len(bodies)}"] if rest == "array" else rest
-                    triangles = data["triangles"][rows] - first_vertex
-                    bodies.append(Body(entry["name"], "cloth", n, triangles, uv, rest=rest))
-                    first_vertex += n
-                    first_triangle += m
-                    continue
-                triangles = data[f"collider_{collider}_triangles"]
-                positions = data[f"collider_{collider}_positions"]
-                collider += 1
-                bodies.append(Body(entry["name"], "collider", n, triangles, None, entry["static"]))
-                if entry["static"]:
-                    standing.append(positions[0])
-                else:
-                    moving.append(positions)
-            return cls(
-                bodies, data["times"], np.concatenate(moving, axis=1), np.concatenate(standing),
-                velocities=data.get("velocities"),
-                fps=meta["fps"], up=meta["up"], name=meta["name"], thickness=meta.get("thickness"),
-            )  # fmt: skip
+        try:
+            found = recorded.read(Path(path))
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise InvalidInput(f"{path}: not a recording that can be read: {reason}", name="path") from error
+        bodies = [
+            Body(
+                b.name,
+                "cloth" if b.kind == "cloth" else "collider",
+                b.vertex_count,
+                b.triangles,
+                b.uv,
+                b.static,
+                b.rest,
+            )
+            for b in found.bodies
+        ]
+        return cls(
+            bodies, found.times, found.moving, found.standing, velocities=found.velocities, fps=found.fps, up=found.up,
+            name=found.name, thickness=found.thickness,
+        )  # fmt: skip
 
     def save_usd(self, path: str | os.PathLike[str]) -> None:
         """Write a USD stage (``.usdc``, ``.usda``, ``.usd``): time-sampled meshes. Needs usd-core.

@@ -112,7 +112,7 @@ def metadata(change: str = "", to: str = "") -> Any:
         "License-File: LICENSE-MIT", "License-File: LICENSE-APACHE",
         "Description-Content-Type: text/markdown; charset=UTF-8; variant=GFM",
         *(f"Classifier: Programming Language :: Python :: 3.{k}" for k in (10, 11, 12, 13)),
-        *(f"Provides-Extra: {extra}" for extra in ("mesh", "usd", "view", "plot", "sweep", "robot", "all")),
+        *(f"Provides-Extra: {extra}" for extra in ("usd", "view", "plot", "sweep", "robot", "all")),
     ]  # fmt: skip
     return email.message_from_string("\n".join(lines).replace(change, to) + "\n\nText\n")
 

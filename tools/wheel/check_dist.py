@@ -17,7 +17,7 @@ from email.message import Message
 from pathlib import Path
 
 PYTHONS = ("3.10", "3.11", "3.12", "3.13")
-EXTRAS = {"mesh", "usd", "view", "plot", "sweep", "robot", "all"}
+EXTRAS = {"usd", "view", "plot", "sweep", "robot", "all"}
 LICENCES = {"LICENSE-APACHE", "LICENSE-MIT"}
 WHEEL_LIMIT, SDIST_LIMIT, FILE_LIMIT = 20e6, 3e6, 250e3  # bytes: far more is something that does not belong there
 # Nothing of this is for those who install.

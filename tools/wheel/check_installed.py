@@ -23,7 +23,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 VERSIONS = ("3.10", "3.11", "3.12", "3.13")
-EXTRAS = ("mesh", "usd", "view", "plot", "robot")
+EXTRAS = ("usd", "view", "plot", "robot")
 # Tests that need neither Rust, nor the repository's folders, nor pictures.
 SUITE = (
     "test_bending", "test_collision", "test_effects", "test_friction", "test_mesh", "test_recording",
