@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability docs pictures kills clean
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability fuzz docs pictures kills notebooks wheel wheel-test clean
 
 help: ## List the targets
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -66,6 +66,21 @@ schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 gallery: build ## Make all studies of the gallery again (five minutes on two idle cores; only there times count)
 	$(BIN)/python tools/gallery.py
 
+notebooks: build ## Run examples/notebooks and store what they print and draw
+	$(BIN)/python tools/notebooks.py
+
+# The wheel is that of the tree; `make wheel-test` builds another one from the source distribution.
+wheel: build ## Build wheel and source distribution into dist/, and look at both: tags, metadata, contents, sizes
+	rm -rf dist
+	$(BIN)/maturin build --release --locked --out dist
+	$(BIN)/maturin sdist --out dist
+	$(BIN)/pip install --quiet --disable-pip-version-check "twine==7.0.0"
+	$(BIN)/twine check --strict dist/*
+	$(BIN)/python tools/wheel/check_dist.py dist
+
+wheel-test: wheel ## Install the wheel into clean environments of each Python 3.10 to 3.13 found, and use it there (minutes)
+	$(BIN)/python tools/wheel/check_installed.py dist
+
 # Blender has NumPy 1 and weighs 0.9 GB installed: an environment of its own.
 blender: build ## Import what we write into headless Blender and compare every vertex (downloads 0.4 GB, Python 3.11)
 	[ -x .venv-blender/bin/python ] || $(PYTHON) -m venv .venv-blender
@@ -76,6 +91,9 @@ blender: build ## Import what we write into headless Blender and compare every v
 validation: build ## Compare with exact solutions and measured fabrics (minutes); writes validation/*.csv, *.png
 	$(BIN)/python -m validation
 
+fuzz: build ## Fuzz all that reads, detection and whole scenes (MINUTES=10); findings go to out/fuzz
+	$(BIN)/python -m fuzz --minutes $(or $(MINUTES),10)
+
 stability: build ## Run the stability atlas, every case over its whole map (minutes); writes stability/
 	$(BIN)/clothsim stability -o stability --overwrite
 
@@ -84,4 +102,4 @@ kills: build ## Kill a run 100 times and a sweep's workers 16 times at random (a
 	$(BIN)/python tools/lost_workers.py --runs 64 --kills 16
 
 clean: ## Remove what the targets above made
-	rm -rf target $(VENV) .venv-blender out
+	rm -rf target $(VENV) .venv-blender out dist

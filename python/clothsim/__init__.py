@@ -13,6 +13,8 @@ Examples
 (121, 3)
 """
 
+import logging as _logging
+
 from clothsim import bending, collision, errors, friction, stability, study, sweep
 from clothsim._core import __version__
 from clothsim.animation import Animation
@@ -38,6 +40,8 @@ from clothsim.mesh import Mesh
 from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
 from clothsim.simulation import Frame, Plan, Simulation, record
+
+_logging.getLogger(__name__).addHandler(_logging.NullHandler())
 
 __all__ = [
     "Animation",

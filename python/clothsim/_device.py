@@ -18,7 +18,7 @@ GPU_METHODS = ("grid", "virtual-subdivision", "octree-single", "octree")
 
 def check_device(device: str) -> str:
     """Refuse what is no name of a device."""
-    if device not in DEVICES:
+    if not isinstance(device, str) or device not in DEVICES:
         expected = f"one of {', '.join(json.dumps(name) for name in DEVICES)}"
         raise InvalidInput(
             f"device: expected {expected}, got {device!r}", name="device", expected=expected, got=repr(device)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from clothsim._arrays import Floats, Ints, floats, indices
+from clothsim._arrays import Floats, Ints, floats, indices, number
 from clothsim.errors import InvalidInput
 
 __all__ = ["Animation"]
@@ -29,7 +29,7 @@ class Animation:
     def __init__(self, positions: ArrayLike, triangles: ArrayLike, fps: float) -> None:
         self.positions: Floats = floats(positions, "positions", "shape (frames, n, 3)")
         self.triangles: Ints = indices(triangles, "triangles")
-        self.fps = float(fps)
+        self.fps = number(fps, "fps", "frames per second > 0")
         if self.positions.ndim != 3 or self.positions.shape[2] != 3:
             expected, got = "shape (frames, n, 3)", f"shape {self.positions.shape}"
             raise InvalidInput(

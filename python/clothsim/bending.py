@@ -148,7 +148,7 @@ _CURVE = {"b1", "b2", "c1"}
 
 
 def _model(model: str) -> str:
-    if model in _MODELS:
+    if isinstance(model, str) and model in _MODELS:
         return "hinge" if model == "linear" else model
     known = "one of " + ", ".join(f'"{name}"' for name in _MODELS)
     near = difflib.get_close_matches(str(model), _MODELS, 1)

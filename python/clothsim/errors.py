@@ -27,8 +27,17 @@ __all__ = [
 ]
 
 
+# A message quotes what came, which can be a megabyte of a damaged file: head and tail of it say enough.
+_HEAD, _TAIL = 1000, 400
+
+
 class ClothSimError(Exception):
-    """Base of every error that clothsim raises on purpose."""
+    """Base of every error that clothsim raises on purpose; as text of bearable length."""
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        left = len(text) - _HEAD - _TAIL
+        return text if left <= 0 else f"{text[:_HEAD]} … ({left} characters) … {text[-_TAIL:]}"
 
 
 class InvalidInput(ClothSimError, ValueError):

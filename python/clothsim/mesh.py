@@ -271,7 +271,14 @@ class Mesh:
         cells : (int, int, int)
             Squares along each axis, ≥ 1.
         """
-        return cls._made(_core.cuboid(list(size), [_whole("cells", count) for count in cells]))
+        lengths = floats(size, "size", "shape (3,) in m")
+        if lengths.shape != (3,):
+            expected, got = "three lengths in m", f"shape {lengths.shape}"
+            raise InvalidInput(f"size: expected {expected}, got {got}", name="size", expected=expected, got=got)
+        if not isinstance(cells, (tuple, list, np.ndarray)) or len(cells) != 3:
+            expected, got = "three whole numbers", repr(cells)
+            raise InvalidInput(f"cells: expected {expected}, got {got}", name="cells", expected=expected, got=got)
+        return cls._made(_core.cuboid(lengths.tolist(), [_whole("cells", count) for count in cells]))
 
     # Files -----------------------------------------------------------------------------------------------------
 
@@ -281,8 +288,7 @@ class Mesh:
 
         Vertices keep the file's order (STL and glTF, which repeat vertices: the order in which triangles first name
         them, equal positions joined). Polygons are triangulated. UV is kept per corner, so seams do not cut the
-        cloth. Groups of OBJ faces are kept. STL and glTF need trimesh, ``pip install 'clothsim[mesh]'``; USD needs
-        usd-core, ``pip install 'clothsim[usd]'``.
+        cloth. Groups of OBJ faces are kept. USD needs usd-core, ``pip install 'clothsim[usd]'``.
 
         Parameters
         ----------

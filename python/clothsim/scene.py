@@ -17,7 +17,7 @@ from clothsim import _core, _formats
 from clothsim._arrays import Floats, Ints, floats
 from clothsim._export.names import file_stem
 from clothsim._files import write_whole
-from clothsim._formats import RawMesh
+from clothsim._formats import RawMesh, numpy_files
 from clothsim._plain import plain
 from clothsim.animation import Animation
 from clothsim.errors import InvalidScene
@@ -91,7 +91,9 @@ class Scene:
         self._core: _core.Scene | None = None
         self.folder: Path | None = None
         tables = {
-            "name": name, "up": up, "gravity": None if gravity is None else np.asarray(gravity), "duration": duration,
+            "name": name, "up": up, "gravity": gravity if gravity is None or isinstance(gravity, (list,
+            tuple)) else np.asarray(gravity),
+            "duration": duration,
             "start": start, "time": time, "solver": solver, "air": air, "contact": contact, "effects": effects,
             "output": output,
         }  # fmt: skip
@@ -315,7 +317,7 @@ class Scene:
             if velocities is not None and velocities.endswith(".npy"):
                 try:
                     self._velocities[velocities] = floats(
-                        np.load(folder / velocities, allow_pickle=False), "velocities", "shape (n, 3)"
+                        numpy_files.load(folder / velocities), "velocities", "shape (n, 3)"
                     )
                 except (ValueError, OSError) as error:
                     core.fail(f"cloth[{i}].velocities", "a file that can be used", str(error))

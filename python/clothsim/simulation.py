@@ -7,17 +7,20 @@ import json
 import logging
 import math
 import os
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clothsim import _core
-from clothsim._arrays import Floats, Ints, number, optional
+from clothsim._arrays import Floats, Ints, floats, number, optional, shape_text
 from clothsim._device import check_device, check_threads
 from clothsim._files import write_whole
+from clothsim._logs import log_step
+from clothsim._scene_facts import contact_thickness, rest_source
 from clothsim.errors import CheckpointError, InvalidInput
 from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
@@ -272,11 +275,19 @@ class Simulation:
             _logger.info('detector "%s" on %s after step %d: %s', *(c[key] for key in keys))
         self._logged_choices = len(choices)
 
+    def _log_steps(self, first: int) -> None:
+        """Say of each step from number ``first`` on what it took, and what went hard."""
+        for step in json.loads(self._core.steps(first)):
+            log_step(_logger, step)
+
     @contextlib.contextmanager
     def _stepping(self) -> Iterator[None]:
+        first = self._step_reports() if _logger.isEnabledFor(logging.INFO) else None
         try:
             yield
         finally:
+            if first is not None:
+                self._log_steps(first)
             self._log_fallbacks()
             self._log_choices()
 
@@ -321,6 +332,62 @@ class Simulation:
         """Do what an interrupted `advance` has left, to the same bits as without the interruption."""
         with self._stepping():
             self._core.finish_advance()
+
+    def steer(
+        self,
+        cloth: str,
+        pin: int = 0,
+        *,
+        position: ArrayLike,
+        rotation: Mapping[str, Any] | None = None,
+        seconds: float,
+    ) -> None:
+        """Have a pin go from where it is to a pose, as a gripper does, and stay there; what it was to do is dropped.
+
+        Parameters
+        ----------
+        cloth, pin
+            Name of the cloth, and the number of its pin in the scene.
+        position : (3,) array
+            Displacement of the pinned vertices from the scene's start [m], as in a keyframe.
+        rotation : mapping, optional
+            ``axis`` and ``angle`` [rad] about the pin's pivot, as in a keyframe; by default none.
+        seconds : float
+            When it is there, from now [s], > 0. It moves as between two keyframes: at a steady pace, along a line.
+
+        Raises
+        ------
+        InvalidInput
+            There is no such cloth or pin, a collider carries it, or an interrupted `advance` has something left.
+        InvalidScene
+            A number that a keyframe may not have.
+
+        Examples
+        --------
+        >>> import clothsim as cs
+        >>> scene = cs.Scene(duration=0.1)
+        >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton", pins=[{"vertices": [0]}])
+        >>> sim = cs.Simulation(scene)
+        >>> start = sim.positions[0]
+        >>> sim.steer("cloth", 0, position=(0.0, 0.1, 0.0), seconds=0.05)
+        >>> sim.advance(0.05)
+        >>> (sim.positions[0] - start).round(6).tolist()
+        [0.0, 0.1, 0.0]
+        """
+        names = [table["name"] for table in json.loads(self._core.scene())["cloth"]]
+        if cloth not in names:
+            expected = f"one of {', '.join(map(repr, names)) or 'no cloth'}"
+            raise InvalidInput(f"cloth: expected {expected}, got {cloth!r}", name="cloth", expected=expected)
+        if not isinstance(pin, int) or pin < 0:
+            raise InvalidInput(f"pin: expected the number of a pin, got {pin!r}", name="pin")
+        turn = None
+        if rotation is not None:
+            if not isinstance(rotation, Mapping) or set(rotation) - {"axis", "angle"} or "angle" not in rotation:
+                raise InvalidInput(f"rotation: expected axis and angle, got {rotation!r}", name="rotation")
+            axis = _three(rotation.get("axis", (0.0, 1.0, 0.0)), "rotation.axis")
+            turn = (axis, number(rotation["angle"], "rotation.angle", "a number [rad]"))
+        pause = number(seconds, "seconds", "a finite number > 0 [s]")
+        self._core.steer(names.index(cloth), pin, _three(position, "position"), turn, pause)
 
     def run(self, seconds: float | None = None, fps: float = 60.0, progress: bool = True) -> Iterator[Frame]:
         """Yield the state now and then ``fps`` times per simulated second.
@@ -417,18 +484,16 @@ class Simulation:
     @property
     def bodies(self) -> list[Body]:
         """Names and meshes of all bodies, cloth first, in scene order."""
-        moving = self._moving_colliders()
+        scene = json.loads(self._core.scene())
+        moving = {c["name"] for c in scene["collider"] if c.get("keyframes") or c.get("sequence")}
+        rests = {c["name"]: rest_source(scene, c) for c in scene["cloth"]}
         bodies = []
         for name, kind, (first, last), (_, triangles, uv) in self._core.bodies():
             if kind == "cloth":
-                bodies.append(Body(name, "cloth", last - first, triangles, uv))
+                bodies.append(Body(name, "cloth", last - first, triangles, uv, rest=rests[name]))
             else:
                 bodies.append(Body(name, "collider", last - first, triangles, uv, name not in moving))
         return bodies
-
-    def _moving_colliders(self) -> set[str]:
-        colliders = json.loads(self._core.scene())["collider"]
-        return {c["name"] for c in colliders if c.get("keyframes") or c.get("sequence")}
 
     @property
     def hinges(self) -> Hinges:
@@ -517,6 +582,13 @@ class Simulation:
         return f"Simulation({cloth} cloth vertices, t = {self.time:g} s)"
 
 
+def _three(value: ArrayLike, name: str) -> tuple[float, float, float]:
+    array = floats(value, name, "shape (3,)")
+    if array.shape != (3,):
+        raise InvalidInput(f"{name}: expected shape (3,), got {shape_text(array)}", name=name)
+    return (float(array[0]), float(array[1]), float(array[2]))
+
+
 def frame_lengths(seconds: float, fps: float) -> list[float]:
     """Time from each frame to the next [s]: 1/fps, the last one shorter where ``seconds`` ends within a frame."""
     rounding = 1e-9  # a whole number of frames but for rounding makes no extra frame
@@ -567,6 +639,8 @@ def record(
     Recording(3 frames of cloth, 0 s to 0.1 s)
     """
     bodies = simulation.bodies
+    if simulation.time > 0.0:  # the first frame is not the scene's start
+        bodies = [replace(body, rest=None) if body.rest == "start" else body for body in bodies]
     scene = json.loads(simulation._core.scene())
     rows, times, velocities = [], [], []
     standing = standing_positions(bodies, simulation.collider_positions)
@@ -577,6 +651,7 @@ def record(
     return Recording(
         bodies, np.array(times), np.array(rows), standing,
         velocities=np.array(velocities), fps=fps, up=scene["up"], name=scene["name"],
+        thickness=contact_thickness(scene),
     )  # fmt: skip
 
 

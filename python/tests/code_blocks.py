@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import shlex
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from conftest import ROOT
+
+from clothsim._toml import tomllib
 
 __all__ = ["Block", "blocks", "commands", "in_a_scene", "pages"]
 

@@ -11,7 +11,7 @@ import pytest
 import clothsim as cs
 from clothsim._formats.polygons import triangulate
 
-trimesh = pytest.importorskip("trimesh", reason="the extra 'mesh' is not installed")
+trimesh = pytest.importorskip("trimesh", reason="trimesh, a reader that is not ours, is not installed")
 
 # Two panels that share the edge (1, 2) and have their own UV there: a seam.
 SEAM = cs.Mesh(

@@ -42,6 +42,8 @@ pub enum Shape {
 const MIN_SEGMENTS: u32 = 8;
 /// Most segments around an axis: a finer tolerance is refused.
 const MAX_SEGMENTS: u32 = 8192;
+/// Most bands of a quarter circle of a capsule, which has 8 n² vertices: four million.
+const MAX_RINGS: u32 = 724;
 
 /// The shape's surface as triangles with outward normals, closed and manifold (the plane: an open square). No point of
 /// it is farther than `tolerance` \[m\] from the true surface, nor the other way round; corners lie on it.
@@ -52,7 +54,7 @@ const MAX_SEGMENTS: u32 = 8192;
 ///
 /// # Errors
 /// [`DetectError::Parameter`] for a size or a tolerance that is not positive and finite, or a tolerance too fine for the
-/// size (below about 4·10⁻⁷ of the radius).
+/// size (below about 4·10⁻⁷ of the radius; of a capsule's 1.2·10⁻⁶).
 pub fn tessellate(shape: &Shape, tolerance: f64) -> Result<TriMesh, DetectError> {
     let tolerance = length("tolerance", tolerance)?;
     match *shape {
@@ -70,6 +72,9 @@ pub fn tessellate(shape: &Shape, tolerance: f64) -> Result<TriMesh, DetectError>
             let keep = (1.0 - tolerance / radius).max(0.0);
             let rings =
                 segments(std::f64::consts::FRAC_PI_2, (keep * keep).acos(), tolerance)?.max(MIN_SEGMENTS / 4);
+            if rings > MAX_RINGS {
+                return Err(too_fine(tolerance));
+            }
             Ok(outward(Capsule::new_y(half_height, radius).to_trimesh(4 * rings, 2 * rings)))
         }
         Shape::Box { half_extents } => {
@@ -123,7 +128,7 @@ fn length(parameter: &'static str, got: f64) -> Result<f64, DetectError> {
 fn too_fine(tolerance: f64) -> DetectError {
     DetectError::Parameter {
         parameter: "tolerance",
-        expected: "at least about 4e-7 of the shape's radius in m",
+        expected: "at least about 4e-7 of the shape's radius in m (1.2e-6 of a capsule's)",
         got: tolerance,
     }
 }

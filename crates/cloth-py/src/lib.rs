@@ -8,6 +8,7 @@ mod convert;
 mod detach;
 mod device;
 mod errors;
+mod examples;
 mod friction;
 mod mesh;
 mod scene;
@@ -50,6 +51,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<session::PySkippingSession>()?;
 
     module.add_class::<scene::PyScene>()?;
+    module.add_function(wrap_pyfunction!(examples::example_scenes, module)?)?;
     module.add_function(wrap_pyfunction!(scene::scene_schema, module)?)?;
     module.add_function(wrap_pyfunction!(scene::material_names, module)?)?;
     module.add_function(wrap_pyfunction!(scene::material_named, module)?)?;

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use cloth_sim::scene::Rotation;
 use cloth_sim::{Advance, Assets, BodyKind, Sequence, SimError, Simulation, SimulationOptions};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -117,6 +118,22 @@ impl PySimulation {
     /// Do what an interrupted `advance` has left.
     fn finish_advance(&self, py: Python<'_>) -> PyResult<usize> {
         self.interruptible(py, |simulation, check| simulation.finish_advance(check).map_err(Box::new))
+    }
+
+    /// Have a pin reach a pose (displacement, axis and angle) in so many seconds.
+    fn steer(
+        &self,
+        py: Python<'_>,
+        cloth: usize,
+        pin: usize,
+        position: [f64; 3],
+        rotation: Option<([f64; 3], f64)>,
+        seconds: f64,
+    ) -> PyResult<()> {
+        let rotation = rotation.map(|(axis, angle)| Rotation { axis, angle });
+        self.detached(py, |simulation| {
+            simulation.steer(cloth, pin, position, rotation, seconds).map_err(Box::new)
+        })
     }
 
     /// Whether an interrupted `advance` has something left.

@@ -385,7 +385,7 @@ fn mesh_error(scene: &Scene, key: &str, name: &str, error: &MeshError) -> SceneE
     scene.error(key, format!("{expected} (\"{name}\")"), got)
 }
 
-fn generate(generator: &Generator) -> Result<TriMesh, MeshError> {
+pub(crate) fn generate(generator: &Generator) -> Result<TriMesh, MeshError> {
     match *generator {
         Generator::Grid { width, height, nx, ny, diagonals } => {
             let diagonals = match diagonals {

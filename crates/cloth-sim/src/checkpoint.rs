@@ -18,6 +18,8 @@ use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
 const VERSION: u32 = 6;
+/// Largest number of a state: beyond, not even its energy need be a number.
+const HUGE: f64 = 1e100;
 const HEADER: usize = MAGIC.len() + 4 + 8;
 
 impl Simulation {
@@ -104,10 +106,18 @@ impl Simulation {
             ..options
         };
         let (time, step) = (payload.f64()?, payload.u64()?);
+        if time < 0.0 {
+            return Err(invalid("a time ≥ 0", time.to_string()));
+        }
         let (x, v, contact_force) = (payload.points()?, payload.points()?, payload.points()?);
         if !contact_force.is_empty() && contact_force.len() != x.len() {
             let got = format!("{} and {}", contact_force.len(), x.len());
             return Err(invalid("as many contact forces as positions", got));
+        }
+        // Before the scene's meshes are made.
+        let least = scene.generated_cloth();
+        if x.len() < least {
+            return Err(invalid(format!("positions of at least {least} vertices"), x.len().to_string()));
         }
         if x.len() != v.len() {
             return Err(invalid("as many velocities as positions", format!("{} and {}", v.len(), x.len())));
@@ -161,6 +171,10 @@ impl Simulation {
         sim.rebuild_awake()?;
         sim.pending = (pending.steps > 0).then_some(pending);
         let past: Report = serde_json::from_str(&report).map_err(|e| invalid("a report", e.to_string()))?;
+        if Some(past.totals.steps) != past.left_out.checked_add(past.steps.len()).map(|n| n as u64) {
+            let got = format!("{} left out and {} listed", past.left_out, past.steps.len());
+            return Err(invalid(format!("a report of {} steps", past.totals.steps), got));
+        }
         let here = std::mem::replace(&mut sim.report, past);
         (sim.report.threads, sim.report.detection) = (here.threads, here.detection);
         sim.report.fallbacks.extend(here.fallbacks);
@@ -312,8 +326,14 @@ impl Reader<'_> {
         Ok(u64::from_le_bytes(self.array()?))
     }
 
+    /// A number as a step can have left it.
     fn f64(&mut self) -> Result<f64, SimError> {
-        Ok(f64::from_le_bytes(self.array()?))
+        let number = f64::from_le_bytes(self.array()?);
+        if number.abs() <= HUGE {
+            Ok(number)
+        } else {
+            Err(invalid(format!("finite numbers of at most {HUGE:e} in size"), number.to_string()))
+        }
     }
 
     /// A count of elements of `size` bytes, which must still be there.

@@ -40,6 +40,7 @@ mod restart;
 mod seams;
 mod simulation;
 mod sleep;
+mod steer;
 mod step;
 mod untangle;
 

@@ -56,6 +56,36 @@ fn defects_of_a_mesh_are_named_with_its_cloth() {
 }
 
 #[test]
+fn meshes_of_absurd_size_are_refused_before_they_are_made() {
+    let text = |count: &str| {
+        let mesh = format!(
+            "mesh = {{ generator = \"grid\", width = 1.0, height = 1.0, nx = {count}, ny = {count} }}"
+        );
+        format!("duration = 1.0\n[[cloth]]\nname = \"skirt\"\n{mesh}\n{MATERIAL}\n")
+    };
+    assert!(Scene::parse_toml(&text("2048"), "a.toml").is_ok());
+    for (count, got) in [("2049", "4198401"), ("65535", "4294836225"), ("4294967295", "18446744065119617025")]
+    {
+        let error = Scene::parse_toml(&text(count), "a.toml").expect_err("too large").to_string();
+        assert_eq!(
+            error,
+            format!(
+                "a.toml:4: cloth[0].mesh: expected at most 4194304 vertices in all generated meshes together, got {got}"
+            )
+        );
+    }
+}
+
+#[test]
+fn messages_quote_no_more_than_one_reads() {
+    let long = "x".repeat(100_000);
+    for text in [format!("{long} = 1"), format!("up = \"{long}\"")] {
+        let error = Scene::parse_toml(&text, "a.toml").expect_err("no scene").to_string();
+        assert!(error.len() < 1200 && error.contains("bytes more)"), "{} bytes", error.len());
+    }
+}
+
+#[test]
 fn a_non_manifold_edge_is_allowed_without_bending() {
     let mut mesh = sheet();
     mesh.vertices.push(Vec3::new(0.1, 0.5, 0.1));

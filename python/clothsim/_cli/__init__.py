@@ -9,13 +9,44 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from clothsim._cli import doctor, export, materials, plan, reproduce, run, schema, stability, study, sweep, tune
+from clothsim._cli import (
+    completion,
+    doctor,
+    example,
+    export,
+    materials,
+    plan,
+    reproduce,
+    run,
+    schema,
+    stability,
+    study,
+    sweep,
+    tune,
+    view,
+)
+from clothsim._cli.logs import add_verbose, show_logs
 from clothsim._core import __version__
 from clothsim.errors import ClothSimError, GpuUnavailable, MissingDependency, OutputError, OutputExists
 
-__all__ = ["main"]
+__all__ = ["build_parser", "main"]
 
-_COMMANDS = (run, plan, export, study, tune, sweep, stability, reproduce, materials, doctor, schema)
+_COMMANDS = (
+    run,
+    plan,
+    example,
+    view,
+    export,
+    study,
+    tune,
+    sweep,
+    stability,
+    reproduce,
+    materials,
+    doctor,
+    schema,
+    completion,
+)
 
 # Exit codes: what was asked for cannot be done / what was asked for is wrong.
 _FAILED, _BAD_INPUT = 1, 2
@@ -26,8 +57,8 @@ class _Parser(argparse.ArgumentParser):
         self.exit(_BAD_INPUT, f"clothsim: {message}\n{self.format_usage().rstrip()}; --help says more\n")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit code: 0, 1 if it failed, 2 for bad input, 130 after Ctrl-C."""
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
     parser = _Parser(
         prog="clothsim",
         description="Cloth simulation: a scene file in; frames, pictures and a report out.",
@@ -46,8 +77,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
         command.add_arguments(sub)
         sub.add_argument("--json", action="store_true", help="print one JSON object on stdout instead of text")
+        add_verbose(sub)
         sub.set_defaults(execute=command.execute)
-    options = parser.parse_args(arguments)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit code: 0, 1 if it failed, 2 for bad input, 130 after Ctrl-C."""
+    options = build_parser().parse_args(arguments)
+    show_logs(options.verbose, quiet=getattr(options, "quiet", False))
     try:
         code: int = options.execute(options)
         sys.stdout.flush()

@@ -18,7 +18,7 @@ def add_existing(parser: argparse.ArgumentParser, what: str) -> None:
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument("--resume", action="store_true", help=f"go on with an unfinished {what} in OUT, or start one")
     mode.add_argument("--overwrite", action="store_true", help=f"replace the {what} that OUT holds")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress and no warnings on stderr")
 
 
 def folder(text: str) -> Path:

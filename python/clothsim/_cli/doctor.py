@@ -23,7 +23,6 @@ EXAMPLE = "clothsim doctor"
 _FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f", "asimd")
 # Optional packages and what they are for.
 _OPTIONAL = {
-    "trimesh": "reading STL and glTF",
     "usd-core": "writing USD",
     "pyvista": "film strips",
     "matplotlib": "plots",

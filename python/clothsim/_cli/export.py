@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--to", metavar="FOLDER", type=Path, help="where to write (default: OUT)")
     parser.add_argument("--overwrite", action="store_true", help="replace files of the same name")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress and no warnings on stderr")
 
 
 def execute(options: argparse.Namespace) -> int:

@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mesh", metavar="FILE", type=Path, help="a mesh of your own, for figure 4.9")
     parser.add_argument("--overwrite", action="store_true", help="replace the figure if OUT holds it")
     parser.add_argument("--threads", metavar="N", type=int, help="how many threads (default: all)")
-    parser.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    parser.add_argument("-q", "--quiet", action="store_true", help="no progress and no warnings on stderr")
 
 
 def execute(options: argparse.Namespace) -> int:

@@ -58,11 +58,6 @@ def execute(options: argparse.Namespace) -> int:
     start = None
     if options.run is not None:
         start = Start.of(read_run(options.run), scene, -1 if options.frame is None else options.frame)
-        if start.estimated and not (options.quiet or options.json):
-            print(
-                "warning: the run kept no velocities; they are differences of its frames (output.velocities = true)",
-                file=sys.stderr,
-            )
     elif options.frame is not None:
         raise InvalidInput("--frame: expected --from RUN with it, got --frame alone", name="--frame")
     job = Job(

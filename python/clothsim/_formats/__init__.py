@@ -35,6 +35,8 @@ def read(path: Path) -> RawMesh:
     if suffix not in READABLE:
         known = ", ".join(READABLE)
         raise MeshError(f"{path}: expected a mesh file ({known}), got suffix {suffix!r}", kind="file")
+    if path.exists() and not path.is_file():
+        raise MeshError(f"{path}: cannot read the mesh: it is no file", kind="file")  # a pipe or device need not end
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -58,9 +60,13 @@ def parse(content: bytes, path: Path) -> RawMesh:
         from clothsim._formats import usd
 
         return usd.load_still(path)
-    from clothsim._formats import soup
+    if suffix in (".gltf", ".glb"):
+        from clothsim._formats import gltf_still
 
-    return soup.load(path)
+        return gltf_still.load(path)
+    from clothsim._formats import stl
+
+    return stl.parse(content, str(path))
 
 
 def write(path: Path, mesh: RawMesh) -> bytes:

@@ -13,12 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from clothsim._arrays import Floats, Ints
+from clothsim._formats.gltf_document import MOST_POINTS
 from clothsim.errors import MeshError
 
 __all__ = ["DEFAULT_FPS", "MOST_POINTS", "RawAnimation", "Request", "allocate", "check_frame", "read"]
 
-# Vertices × frames that are loaded at most: 2.4 GB of float64.
-MOST_POINTS = 100_000_000
 # Samples per second of a file that is continuous in time.
 DEFAULT_FPS = 60.0
 

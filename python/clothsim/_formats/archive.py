@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from pathlib import Path
-
-import numpy as np
 
 from clothsim._arrays import floats, indices
 from clothsim._formats.animation import RawAnimation, Request
+from clothsim._formats.numpy_files import Archive
 from clothsim.errors import InvalidInput, MeshError
 
 __all__ = ["load"]
@@ -18,17 +15,18 @@ __all__ = ["load"]
 def load(path: Path, _request: Request) -> RawAnimation:
     """Read the two arrays; other arrays of the archive are passed over."""
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            names = sorted(data) if isinstance(data, np.lib.npyio.NpzFile) else ["one array without a name"]
+        with Archive(path) as data:
+            names = data.names
             if missing := {"positions", "triangles"} - set(names):
                 raise MeshError(
-                    f"{path}: expected positions and triangles, got {names}: {', '.join(sorted(missing))} missing",
+                    f"{path}: expected positions and triangles, got {', '.join(names)[:200] or 'nothing'}: "
+                    f"{', '.join(sorted(missing))} missing",
                     kind="file",
                 )
             positions, triangles = data["positions"], data["triangles"]
     except MeshError:
         raise
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise MeshError(f"{path}: not an archive that can be read: {reason}", kind="file") from error
     try:

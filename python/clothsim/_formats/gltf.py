@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from clothsim._arrays import Floats, Ints
-from clothsim._formats.animation import DEFAULT_FPS, RawAnimation, Request, allocate
+from clothsim._formats.animation import DEFAULT_FPS, MOST_POINTS, RawAnimation, Request, allocate
 from clothsim._formats.gltf_document import Document
 from clothsim._formats.gltf_motion import Nodes, sampled
 from clothsim.errors import MeshError
@@ -32,7 +32,12 @@ def load(path: Path, request: Request) -> RawAnimation:
     times = _times(document, animation, fps)
     channels = {} if animation is None else sampled(document, animation, times)
     nodes = Nodes(document, channels, len(times))
-    parts = [_Part(document, nodes, index) for index in _with_meshes(document, nodes, request.part)]
+    top = None if request.part is None else _named(document, nodes, request.part)
+    parts = [_Part(document, nodes, index) for index in nodes.with_meshes(top)]
+    # A transform is as large as six positions.
+    turning = len(nodes.entries) + sum(part.joints for part in parts)
+    if 6 * len(times) * turning > MOST_POINTS:
+        raise MeshError(f"{path}: expected fewer frames or nodes, got {len(times)} frames of {turning}", kind="file")
     if not sum(len(part.triangles) for part in parts):
         raise MeshError(f"{path}: expected at least one triangle, got none", kind="empty")
     firsts = np.cumsum([0, *(part.count for part in parts)]).tolist()
@@ -72,23 +77,16 @@ def _times(document: Document, animation: dict[str, Any] | None, fps: float) -> 
     return np.arange(count) / fps
 
 
-def _with_meshes(document: Document, nodes: Nodes, part: str | None) -> list[int]:
-    """Nodes with a mesh, of the file's scene, in their order; at and below the node named ``part`` if that is given."""
-    scene = document.item("scenes", document.get(document.json, "scene", int, 0)) if document.json.get("scenes") else {}
-    roots = document.get(scene, "nodes", list, [i for i in range(len(nodes.entries)) if i not in nodes.parent])
-    if part is not None:
-        named = [i for i, node in enumerate(nodes.entries) if node.get("name") == part]
-        if len(named) != 1:
-            known = sorted({str(n["name"]) for n in nodes.entries if "name" in n})
-            raise MeshError(
-                f"{document.path}: part: expected the name of one node, of {known}, got {part!r} ({len(named)} nodes)",
-                kind="file",
-            )
-        roots = named
-    inside = set(roots)
-    return [
-        i for i, node in enumerate(nodes.entries) if node.get("mesh") is not None and inside.intersection(nodes.line(i))
-    ]
+def _named(document: Document, nodes: Nodes, part: str) -> int:
+    """The one node of that name."""
+    named = [i for i, node in enumerate(nodes.entries) if node.get("name") == part]
+    if len(named) != 1:
+        known = sorted({str(n["name"]) for n in nodes.entries if "name" in n})
+        raise MeshError(
+            f"{document.path}: part: expected the name of one node, of {known}, got {part!r} ({len(named)} nodes)",
+            kind="file",
+        )
+    return named[0]
 
 
 class _Part:
@@ -103,6 +101,7 @@ class _Part:
         for joint in joints:
             document.item("nodes", joint)
         self._joints = joints
+        self.joints = len(joints)
         pieces = []
         for number, primitive in enumerate(document.get(mesh, "primitives", list, [])):
             if document.get(primitive, "mode", int, 4) != 4:

@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from clothsim._arrays import Floats, Ints
 from clothsim.errors import MeshError
 
-__all__ = ["Document"]
+__all__ = ["MOST_POINTS", "Document"]
+
+# Positions, of all frames or of all that is read, which a file may hold at most: 2.4 GB of float64.
+MOST_POINTS = 100_000_000
 
 # glTF's names of component types and of element types.
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -54,6 +57,7 @@ class Document:
         if required := self.get(parsed, "extensionsRequired", list, []):
             raise self.error(f"expected no required extensions, got {required}: export without compression")
         self._buffers: dict[int, bytes] = {}
+        self._given = 0
 
     def error(self, reason: str) -> MeshError:
         """Say what is wrong with the file."""
@@ -130,7 +134,7 @@ class Document:
                     raise self.error(f"buffers[{index}]: expected base64 ({error})") from error
             else:
                 try:
-                    content = (self.path.parent / unquote(uri)).read_bytes()
+                    content = self._beside(unquote(uri))
                 except (OSError, ValueError) as error:
                     reason = getattr(error, "strerror", None) or str(error)
                     raise self.error(f"buffers[{index}]: cannot read {uri!r}: {reason}") from error
@@ -140,20 +144,34 @@ class Document:
             self._buffers[index] = content
         return self._buffers[index]
 
+    def _beside(self, name: str) -> bytes:
+        """The bytes of a file that this one names; devices and pipes, which need not end, are none."""
+        path = self.path.parent / name
+        if path.exists() and not path.is_file():
+            raise ValueError("it is no file")
+        return path.read_bytes()
+
     def _accessor(self, index: Any, kind: str, what: str) -> tuple[dict[str, Any], NDArray[Any]]:
         entry = self.item("accessors", index)
-        if entry.get("type") != kind or entry.get("componentType") not in _COMPONENTS:
-            got = f"{entry.get('type')!r} of component type {entry.get('componentType')!r}"
+        component = self.get(entry, "componentType", int, 0)
+        if entry.get("type") != kind or component not in _COMPONENTS:
+            got = f"{entry.get('type')!r:.60} of component type {component}"
             raise self.error(f"{what}: expected {kind}, got {got}")
         count = self.get(entry, "count", int, -1)
-        item = np.dtype(_COMPONENTS[entry["componentType"]])
+        item = np.dtype(_COMPONENTS[component])
         where = f"accessors[{index}]"
         if self.get(entry, "bufferView", int) is None:
-            if not 0 <= count <= 2**31:
-                raise self.error(f"{where}: expected a count ≥ 0, got {count}")
+            # Zeros; what they belong to has bytes in the file.
+            most = sum(len(self._buffer(i)) for i in range(len(self.get(self.json, "buffers", list, []))))
+            if not 0 <= count <= most:
+                raise self.error(f"{where}: expected a count ≥ 0 of no more rows than the file has bytes, got {count}")
             values = np.broadcast_to(np.zeros(1, item), (count, _WIDTHS[kind]))
         else:
             values = self._rows(entry, entry["bufferView"], count, item, _WIDTHS[kind], where)
+        # So far nothing was copied, and many accessors can be over the same bytes.
+        self._given += values.size
+        if self._given > 3 * MOST_POINTS:
+            raise self.error(f"{where}: expected at most {3 * MOST_POINTS} numbers in all accessors that are used")
         sparse = self.get(entry, "sparse", dict)
         return entry, values if sparse is None else self._sparse(sparse, values, kind, where)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from clothsim._arrays import Floats, Ints
-from clothsim._formats.gltf_document import Document
+from clothsim._formats.gltf_document import MOST_POINTS, Document
 
 __all__ = ["Nodes", "sampled"]
 
@@ -45,23 +46,41 @@ class Nodes:
                         f"nodes[{child}]: expected one parent, got nodes {parent[child]} and {index}"
                     )
                 parent[child] = index
-        for index in range(len(self.entries)):
-            self.line(index, parent)
+        # With one parent each, what no root reaches is in a ring.
+        reached = self._reached([i for i in range(len(self.entries)) if i not in parent])
+        if len(reached) < len(self.entries):
+            index = min(set(range(len(self.entries))) - reached)
+            raise self._document.error(f"nodes[{index}]: expected a tree, got a node that is its own ancestor")
         return parent
 
-    def line(self, index: int, parent: dict[int, int] | None = None) -> list[int]:
-        """Return the node and its ancestors, the root last."""
-        parents = self.parent if parent is None else parent
-        line = [index]
-        while (above := parents.get(line[-1])) is not None:
-            line.append(above)
-            if len(line) > len(self.entries):
-                raise self._document.error(f"nodes[{index}]: expected a tree, got a node that is its own ancestor")
-        return line
+    def _reached(self, roots: Iterable[int]) -> set[int]:
+        """The nodes at and below these."""
+        reached: set[int] = set()
+        todo = list(roots)
+        while todo:
+            node = todo.pop()
+            if node not in reached:
+                reached.add(node)
+                todo += self._document.get(self.entries[node], "children", list, [])
+        return reached
+
+    def with_meshes(self, part: int | None = None) -> list[int]:
+        """Nodes with a mesh, of the file's scene, in their order; only those at and below ``part`` if it is given."""
+        document = self._document
+        number = document.get(document.json, "scene", int, 0)
+        scene = document.item("scenes", number) if document.json.get("scenes") else {}
+        roots = document.get(scene, "nodes", list, [i for i in range(len(self.entries)) if i not in self.parent])
+        for root in roots:
+            document.item("nodes", root)
+        inside = self._reached(roots if part is None else [part])
+        return [i for i in sorted(inside) if self.entries[i].get("mesh") is not None]
 
     def world(self, index: int) -> Floats:
         """Transform of a node to the scene's coordinates at each time, shape (times, 4, 4), for column vectors."""
-        for node in reversed(self.line(index)):
+        line = [index]
+        while line[-1] not in self._world and line[-1] in self.parent:
+            line.append(self.parent[line[-1]])
+        for node in reversed(line):
             if node not in self._world:
                 local = self._local(node)
                 above = self.parent.get(node)
@@ -126,6 +145,7 @@ def _rotation(q: Floats) -> Floats:
 def sampled(document: Document, animation: dict[str, Any], times: Floats) -> dict[tuple[int, str], Floats]:
     """Values of an animation's channels at ``times`` [s], (times, width), by (node, path); held outside the keys."""
     out: dict[tuple[int, str], Floats] = {}
+    room = 0
     samplers = document.get(animation, "samplers", list, [])
     for number, channel in enumerate(document.get(animation, "channels", list, [])):
         target = document.get(channel, "target", dict, {})
@@ -150,6 +170,9 @@ def sampled(document: Document, animation: dict[str, Any], times: Floats) -> dic
         if not len(values) or len(values) % sets or (path != "weights" and len(values) != sets):
             raise document.error(f"{where}.output: expected values for {len(keys)} keys ({mode}), got {len(values)}")
         table = values.reshape(len(keys), 3 if mode == "CUBICSPLINE" else 1, -1)
+        room += len(times) * table.shape[2]
+        if room > 3 * MOST_POINTS:
+            raise document.error(f"{where}: expected at most {3 * MOST_POINTS} values of all channels at all times")
         out[node, path] = _interpolate(keys, table, times, mode, turning=path == "rotation")
     return out
 

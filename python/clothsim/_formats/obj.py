@@ -18,6 +18,9 @@ from clothsim.errors import MeshError
 
 __all__ = ["dump", "parse"]
 
+# Lines that name many groups before many faces ask for room of the product: ten groups of a million faces each.
+_MOST_MEMBERS = 10_000_000
+
 
 def parse(content: bytes, name: str) -> RawMesh:
     """Parse the text of an OBJ file; ``name`` is for messages. Normals and lines are passed over.
@@ -30,6 +33,7 @@ def parse(content: bytes, name: str) -> RawMesh:
     faces: list[tuple[list[int], list[int]]] = []
     current: dict[str, list[str]] = {"g": [], "o": [], "usemtl": []}
     members: dict[str, list[int]] = {}
+    room = _MOST_MEMBERS
     text = content.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split()
@@ -41,7 +45,11 @@ def parse(content: bytes, name: str) -> RawMesh:
             elif words[0] == "vt":
                 coordinates.append((float(words[1]), float(words[2]) if len(words) > 2 else 0.0))
             elif words[0] == "f":
-                for group in dict.fromkeys(name for names in current.values() for name in names):
+                named = dict.fromkeys(name for names in current.values() for name in names)
+                room -= len(named)
+                if room < 0:
+                    raise ValueError(f"expected at most {_MOST_MEMBERS} faces in all groups together")
+                for group in named:
                     members.setdefault(group, []).append(len(faces))
                 faces.append(_face(words[1:], len(vertices), len(coordinates)))
             elif words[0] == "g":
@@ -54,12 +62,25 @@ def parse(content: bytes, name: str) -> RawMesh:
     if not faces:
         raise MeshError(f"{name}: expected at least one face, got none", kind="empty")
     points = np.array(vertices, dtype=np.float64).reshape(-1, 3)
-    corners, uv_corners, face_of = _triangles(faces, points)
+    try:
+        corners, uv_corners, face_list = _triangles(faces, points)
+    except ValueError as error:
+        raise MeshError(f"{name}: {error}", kind="file") from error
+    face_of = np.array(face_list)
     uv = None
     if coordinates and min(map(min, uv_corners)) >= 0:
         uv = np.array(coordinates, dtype=np.float64)[np.array(uv_corners)]
-    groups = {name: np.flatnonzero(np.isin(face_of, faces_of)) for name, faces_of in members.items()}
+    groups = {name: _triangles_of(np.array(faces_of), face_of) for name, faces_of in members.items()}
     return RawMesh(points, np.array(corners, dtype=np.int64), uv, groups or None)
+
+
+def _triangles_of(faces: Ints, face_of: Ints) -> Ints:
+    """The triangles that ascending faces were cut into; ``face_of`` (m,), ascending, has the face of each triangle."""
+    first, last = np.searchsorted(face_of, faces, "left"), np.searchsorted(face_of, faces, "right")
+    lengths = last - first
+    ends = np.cumsum(lengths)
+    # A row of triangles per face, one after the other.
+    return np.repeat(first - (ends - lengths), lengths) + np.arange(int(lengths.sum()))
 
 
 def _face(words: list[str], vertex_count: int, uv_count: int) -> tuple[list[int], list[int]]:

@@ -45,7 +45,7 @@ def parse(content: bytes, name: str) -> RawMesh:
     """Parse a PLY file; ``name`` is for messages. UV is read from vertex properties (s, t), (u, v) or texture_u/v."""
     try:
         return _parse(content)
-    except (ValueError, IndexError, KeyError, UnicodeDecodeError) as error:
+    except (ValueError, IndexError, KeyError, OverflowError, UnicodeDecodeError) as error:
         raise MeshError(f"{name}: not a PLY file that can be read: {error}", kind="file") from error
 
 
@@ -124,6 +124,8 @@ def _header(content: bytes) -> tuple[str, list[_Element], int]:
                 order = _ORDERS[kind]
             case ["element", element, count]:
                 elements.append(_Element(element, int(count)))
+                if elements[-1].count < 0:
+                    raise ValueError(f"header line {line!r}")
             case ["property", "list", count_type, item, key]:
                 elements[-1].properties.append(_Property(key, _TYPES[item], _TYPES[count_type]))
             case ["property", item, key]:
@@ -146,7 +148,8 @@ class _Ascii:
 
     def read(self, element: _Element) -> dict[str, list[object]]:
         columns: dict[str, list[object]] = {p.name: [] for p in element.properties}
-        for _ in range(element.count):
+        # An element without properties takes no bytes, however many the header counts.
+        for _ in range(element.count if element.properties else 0):
             for p in element.properties:
                 if p.count_type is None:
                     columns[p.name].append(self._take(1, p.type)[0])
@@ -155,6 +158,8 @@ class _Ascii:
         return columns
 
     def _take(self, count: int, kind: str) -> list[float] | list[int]:
+        if count < 0:
+            raise ValueError(f"expected the length of a list, got {count}")
         words = self.words[self.at : self.at + count]
         if len(words) != count:
             raise ValueError("the file ends before its last element")
@@ -171,7 +176,7 @@ class _Binary:
         self.at = 0
 
     def read(self, element: _Element) -> dict[str, Any]:
-        if element.count == 0:
+        if element.count == 0 or not element.properties:
             return {p.name: [] for p in element.properties}
         lengths = self._first_lengths(element)
         fields: list[tuple[str, str] | tuple[str, str, int]] = []

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,11 @@ def load(path: Path, request: Request, *, most_frames: int | None = None) -> Raw
     Sampled once per time code from the stage's start to its end, or ``request.fps`` times a second. Polygons become
     triangles in the first frame; subdivision surfaces are taken as their control meshes.
     """
+    with _in_words(path):
+        return _load(path, request, most_frames)
+
+
+def _load(path: Path, request: Request, most_frames: int | None) -> RawAnimation:
     usd = optional("pxr.Usd", extra="usd", purpose="reading USD")
     geom = optional("pxr.UsdGeom", extra="usd", purpose="reading USD")
     stage = _open(path)
@@ -68,13 +75,25 @@ def load(path: Path, request: Request, *, most_frames: int | None = None) -> Raw
 
 def _open(path: Path) -> Any:
     usd = optional("pxr.Usd", extra="usd", purpose="reading USD")
-    tf = optional("pxr.Tf", extra="usd", purpose="reading USD")
     if not path.is_file():
         raise MeshError(f"{path}: cannot read the mesh: no such file", kind="file")
-    try:
+    with _in_words(path):
         return usd.Stage.Open(str(path))
-    except tf.ErrorException as error:
-        reason = "; ".join(line.strip() for line in str(error).splitlines() if line.strip())
+
+
+@contextmanager
+def _in_words(path: Path) -> Iterator[None]:
+    """Turn what usd-core raises over a damaged file into a `MeshError` that names it."""
+    tf = optional("pxr.Tf", extra="usd", purpose="reading USD")
+    try:
+        yield
+    except MeshError:
+        raise
+    except (tf.ErrorException, RuntimeError, ValueError, TypeError, OverflowError) as error:
+        try:
+            reason = "; ".join(line.strip() for line in str(error).splitlines() if line.strip())
+        except UnicodeDecodeError:  # it quotes the file's bytes
+            reason = "it is damaged"
         raise MeshError(f"{path}: not a USD file that can be read: {reason}", kind="file") from error
 
 
@@ -181,5 +200,6 @@ class _Part:
                 kind="topology",
             )
         matrix = np.array(cache.GetLocalToWorldTransform(self._prim), dtype=np.float64)
-        moved: Floats = points @ matrix[:3, :3] + matrix[3, :3]
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused for the whole frame
+            moved: Floats = points @ matrix[:3, :3] + matrix[3, :3]
         return moved

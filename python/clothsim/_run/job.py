@@ -6,7 +6,6 @@ import contextlib
 import json
 import logging
 import signal
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ from clothsim._run.folder import RunFolder, digest, read_checkpoint
 from clothsim._run.frames import FrameWriter
 from clothsim._run.outputs import Outputs, check_packages
 from clothsim._run.start import Start
+from clothsim._scene_facts import contact_thickness
 from clothsim.errors import (
     CheckpointError,
     ClothSimError,
@@ -206,12 +206,12 @@ class Job:
         if not self.resume:
             folder.clear_work()
         header, simulation, writer = self._start(folder, fingerprint, simulation)
-        if self.progress and header["frames"] == 0:
+        if header["frames"] == 0:
             for warning in simulation.plan["warnings"]:
-                print(f"warning: {warning}", file=sys.stderr)
+                _logger.warning("%s", warning)
         fps = float(settings["fps"])
         lengths = self._lengths()
-        bodies = simulation.bodies
+        bodies = simulation.bodies if self.start is None else self.start.undeformed(simulation.bodies)
         standing = standing_positions(bodies, simulation.collider_positions)
         every = round(float(settings["checkpoint_interval"]) * fps)
         moving = sum(b.vertex_count for b in bodies if not b.static)
@@ -231,6 +231,7 @@ class Job:
             recording = Recording(
                 bodies, times, rows[:, :moving], standing,
                 velocities=rows[:, moving:] if with_velocities else None, fps=fps, up=scene["up"], name=scene["name"],
+                thickness=contact_thickness(scene),
             )  # fmt: skip
             outputs = Outputs(
                 self.out, settings, recording, lines, simulation, facts.wall_seconds(), error, fingerprint
@@ -325,8 +326,6 @@ class Job:
             if damage:
                 text = f"{'; '.join(damage)}. Going on from the checkpoint before, at {resumed.time:g} s"
                 _logger.warning("%s", text)
-                if self.progress:
-                    print(f"warning: {text}", file=sys.stderr)
             return header, resumed, writer
         if damage:
             raise CheckpointError(f"{'; '.join(damage)}. There is no other checkpoint; --overwrite starts anew")

@@ -7,13 +7,13 @@ import difflib
 import itertools
 import math
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from clothsim._toml import tomllib
 from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
 from clothsim.study.resolution import set_resolution

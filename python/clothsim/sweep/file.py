@@ -5,13 +5,13 @@ from __future__ import annotations
 import difflib
 import json
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from clothsim import _core
+from clothsim._toml import tomllib
 from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.scene import Scene
 from clothsim.study.axes import NAMED

@@ -3,6 +3,9 @@
 use super::{count, length};
 use crate::{MeshError, TriMesh, Vec3};
 
+/// Most points of the lattice in which those of the surface are numbered: half a gigabyte.
+const MAX_LATTICE: usize = 1 << 27;
+
 /// A closed box of `size` (x, y, z) [m], centred, each side cut into `cells` along the three axes, two triangles per
 /// cell. Faces share the vertices on the box's edges.
 ///
@@ -26,6 +29,14 @@ pub fn cuboid(size: [f64; 3], cells: [usize; 3]) -> Result<TriMesh, MeshError> {
     }
 
     let points = cells.map(|c| c + 1);
+    let lattice = points.iter().product::<usize>();
+    if lattice > MAX_LATTICE {
+        return Err(MeshError::Parameter {
+            parameter: "cells",
+            expected: "at most 2²⁷ points in the lattice",
+            got: lattice as f64,
+        });
+    }
     let flat = |[i, j, k]: [usize; 3]| (k * points[1] + j) * points[0] + i;
     // Numbers of the lattice's surface points, in lattice order.
     let mut index = vec![u32::MAX; points[0] * points[1] * points[2]];

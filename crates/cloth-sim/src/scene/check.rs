@@ -44,6 +44,7 @@ impl Scene {
         for (i, collider) in self.collider.iter().enumerate() {
             self.check_collider(collider, &format!("collider[{i}]"))?;
         }
+        self.check_generated()?;
         self.check_sizes()
     }
 

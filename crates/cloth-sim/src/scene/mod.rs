@@ -11,6 +11,7 @@ mod effects;
 mod file;
 mod friction;
 mod garment;
+mod generated;
 mod motion;
 mod output;
 mod schema;

@@ -50,9 +50,9 @@ impl SceneError {
         Self {
             file: source.and_then(|s| s.file.clone()),
             line: source.and_then(|s| s.line(key)),
-            key: key.into(),
+            key: bearable(key.into()),
             expected: expected.into(),
-            got: got.into(),
+            got: bearable(got.into()),
             nearest: None,
         }
     }
@@ -65,8 +65,22 @@ impl SceneError {
     }
 }
 
+/// A text of a message; what came can be a megabyte of a damaged file.
+fn bearable(text: String) -> String {
+    const MOST: usize = 300;
+    match text.char_indices().nth(MOST) {
+        Some((at, _)) => format!("{}… ({} bytes more)", &text[..at], text.len() - at),
+        None => text,
+    }
+}
+
 /// The known name that is fewest edits away, if that is at most a third of its length (at least two edits).
 pub fn nearest<'a>(got: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    // The distance takes time and room of the product of both lengths.
+    const LONGEST: usize = 100;
+    if got.len() > LONGEST {
+        return None;
+    }
     known
         .map(|name| (strsim::damerau_levenshtein(got, name), name))
         .min()
