@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability clean
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability docs pictures clean
 
 help: ## List the targets
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -53,6 +53,12 @@ bench: setup ## Criterion benches of every kernel and scene (minutes); one of th
 compare: build ## Detection side by side with IPC Toolkit, in one run (installs it into the environment)
 	$(BIN)/pip install --quiet "ipctk==1.6.1"
 	$(BIN)/python benches/compare_ipctk.py
+
+docs: build ## The documentation site, strictly, into out/site (open out/site/index.html)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+pictures: build ## Draw the pictures of the effects again (two minutes): docs/images/effects
+	$(BIN)/python tools/pages/pictures.py
 
 schema: build ## Write the JSON schema of scene files to docs/scene.schema.json
 	$(BIN)/clothsim schema > docs/scene.schema.json

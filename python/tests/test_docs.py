@@ -8,11 +8,10 @@ import pkgutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT, without_gpu
+from conftest import ROOT
 
 import clothsim as cs
 
@@ -89,45 +88,6 @@ def test_the_published_schema_is_the_present_one() -> None:
     assert (ROOT / "docs" / "scene.schema.json").read_text() == schema, "run `make schema`"
 
 
-def test_the_example_in_the_readme_runs(tmp_path: Path) -> None:
-    text = (ROOT / "README.md").read_text()
-    code = text.split("```python\n")[1].split("```")[0]
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "lowest point" in done.stdout
-
-
-def test_the_examples_on_gpus_run(tmp_path: Path) -> None:
-    """The Python blocks as they stand, and the options of the commands."""
-    text = (ROOT / "docs" / "gpu.md").read_text()
-    blocks = [part.split("```")[0] for part in text.split("```python\n")[1:]]
-    assert len(blocks) == 2
-    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1], [0.2, 0.1, 0.2], [1.2, 1, 0.2], [0.2, 1, 1.2]])
-    scene = cs.Scene(contact={"thickness": 0.01}, duration=0.1)
-    scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton")
-    names: dict[str, Any] = {
-        "cs": cs,
-        "x_t0": x,
-        "x_t1": x - [0, 0.2, 0],
-        "triangles": [[0, 1, 2], [3, 4, 5]],
-        "scene": scene,
-    }
-    try:
-        for block in blocks:
-            exec(block, names)
-    except cs.GpuUnavailable as reason:
-        without_gpu(reason)
-    assert names["sim"].report["detection"].keys() == {"detector", "device", "why", "device_bytes"}
-    commands = text.split("```sh\n")[1].split("```")[0].splitlines()
-    for command in commands:
-        line = command.replace("clothsim ", "", 1).replace("out/drape", str(tmp_path / "out")).split()
-        line += ["--frames", "1", "--quiet"] if line[0] == "run" else []
-        done = subprocess.run(
-            [sys.executable, "-m", "clothsim", *line], cwd=ROOT, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr
-
-
 def test_the_table_of_methods_has_every_method() -> None:
     """A detector that is added is in the documentation, the schema and the error that lists them."""
     with pytest.raises(cs.InvalidInput) as caught:
@@ -138,29 +98,3 @@ def test_the_table_of_methods_has_every_method() -> None:
     assert listed == known
     schema = (ROOT / "docs" / "scene.schema.json").read_text()
     assert all(f'\\"{name}\\"' in schema for name in known)
-
-
-def test_the_page_on_formats_runs_from_top_to_bottom(tmp_path: Path) -> None:
-    """Python, the scene and the commands, in the page's order and one folder."""
-    parts = (ROOT / "docs" / "formats.md").read_text().split("```")
-    blocks = [tuple(part.split("\n", 1)) for part in parts[1::2]]
-    assert [kind for kind, _ in blocks] == ["python", "toml", "python", "sh", "sh", "python"]
-    script: list[str] = ["import subprocess, sys"]
-    for kind, text in blocks:
-        if kind == "python":
-            script.append(text)
-        elif kind == "toml":
-            quick = text.replace("velocities = true", "velocities = true\nfilm_strip = false\nplots = false")
-            (tmp_path / "poncho.toml").write_text(quick)
-        else:
-            script += [
-                f"subprocess.run([sys.executable, '-m', *{line.split()!r}], check=True)" for line in text.splitlines()
-            ]
-    done = subprocess.run(
-        [sys.executable, "-c", "\n".join(script)], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "stitches" in done.stdout
-    out = sorted(p.name for p in (tmp_path / "out").iterdir())
-    assert out == ["frames.npz", "obj", "pc2", "report.json", "scene.glb", "scene.usdc", "vtk"]
-    assert (tmp_path / "later" / "report.json").exists()
