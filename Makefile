@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability docs pictures clean
+.PHONY: help setup build demo test test-rust test-python lint fmt bench compare schema blender gallery validation stability docs pictures kills clean
 
 help: ## List the targets
 	@awk 'BEGIN {FS = ":.*## "} /^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -78,6 +78,10 @@ validation: build ## Compare with exact solutions and measured fabrics (minutes)
 
 stability: build ## Run the stability atlas, every case over its whole map (minutes); writes stability/
 	$(BIN)/clothsim stability -o stability --overwrite
+
+kills: build ## Kill a run 100 times and a sweep's workers 16 times at random (10 minutes); every byte has to be the same
+	$(BIN)/python tools/kills.py --kills 100
+	$(BIN)/python tools/lost_workers.py --runs 64 --kills 16
 
 clean: ## Remove what the targets above made
 	rm -rf target $(VENV) .venv-blender out

@@ -13,12 +13,13 @@ Examples
 (121, 3)
 """
 
-from clothsim import bending, collision, errors, friction, stability, study
+from clothsim import bending, collision, errors, friction, stability, study, sweep
 from clothsim._core import __version__
 from clothsim.animation import Animation
 from clothsim.errors import (
     CheckpointError,
     ClothSimError,
+    ClusterError,
     DeviceError,
     GpuUnavailable,
     IntersectingStart,
@@ -43,6 +44,7 @@ __all__ = [
     "Body",
     "CheckpointError",
     "ClothSimError",
+    "ClusterError",
     "DeviceError",
     "Fabric",
     "Frame",
@@ -72,4 +74,5 @@ __all__ = [
     "record",
     "stability",
     "study",
+    "sweep",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import BinaryIO
 
 from clothsim.errors import OutputError, OutputExists
 
-__all__ = ["output_error", "replacing", "whole", "whole_folder", "write_whole"]
+__all__ = ["output_error", "remove_parts", "replacing", "whole", "whole_folder", "write_whole"]
 
 
 @contextlib.contextmanager
@@ -34,12 +35,14 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 def replacing(path: Path) -> Iterator[Path]:
     """Give the name of a temporary neighbour of ``path``, with its suffix, for a library that writes by name.
 
-    On success the file becomes ``path``, else it is removed.
+    On success the file, safe on the disk, becomes ``path``, else it is removed.
     """
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         yield temporary
+        _settle(temporary)
         os.replace(temporary, path)
+        _settle(path.parent)
     except OSError as error:
         raise output_error(path, error) from error
     finally:
@@ -65,13 +68,42 @@ def whole_folder(folder: Path, *, overwrite: bool) -> Iterator[Path]:
         shutil.rmtree(part, ignore_errors=True)
         part.mkdir(parents=True)
         yield part
+        for path in part.rglob("*"):
+            _settle(path)
         if folder.exists():
             shutil.rmtree(folder)
         part.rename(folder)
+        _settle(folder.parent)
     except OSError as error:
         raise output_error(folder, error) from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
+
+
+def _settle(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk and not only on their way."""
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except OSError:  # a folder on a system that opens none: its names come to the disk by and by
+        return
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EBADF):  # some file systems sync no folders
+            raise
+    finally:
+        os.close(handle)
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what a killed process has left of files and folders that it was writing here."""
+    for path in folder.glob(".*.part*"):
+        if re.fullmatch(r"\..+\.part(\.[^.]+)?", path.name):
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                with contextlib.suppress(OSError):
+                    path.unlink()
 
 
 def write_whole(path: Path, content: bytes) -> None:

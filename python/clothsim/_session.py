@@ -126,6 +126,17 @@ class SkippingSession:
     ) -> Detection:
         """Find every pair in contact in this frame; see :func:`detect` for the arguments and the result.
 
+        Parameters
+        ----------
+        x_t0 : (n, 3) array
+            Positions at the start of the frame [m].
+        x_t1 : (n, 3) array
+            Positions at its end [m].
+        thickness : float
+            Distance that counts as contact [m], ≥ 0.
+        mode : {"continuous", "discrete"}
+            During the motion, or at ``x_t1`` alone.
+
         Raises
         ------
         InvalidInput

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 __all__ = [
     "CheckpointError",
     "ClothSimError",
+    "ClusterError",
     "DeviceError",
     "GpuUnavailable",
     "IntersectingStart",
@@ -216,7 +217,19 @@ class DeviceError(ClothSimError, RuntimeError):
 
 
 class GpuUnavailable(DeviceError):
-    """A GPU was asked for, and there is none that can be used."""
+    """A GPU was asked for, and there is none that can be used.
+
+    Parameters
+    ----------
+    message : str
+        What is missing, and what to do.
+    device : str
+        The adapter with its driver, where there is one.
+    """
+
+
+class ClusterError(ClothSimError, ConnectionError):
+    """The workers of a sweep cannot be reached, or do not start; what has finished is kept."""
 
 
 class MissingDependency(ClothSimError, ImportError):

@@ -187,6 +187,11 @@ class Library(Mapping[str, Material]):
     def fabric(self, name: str) -> Fabric:
         """All values of the fabric called ``name``, each with its unit and source.
 
+        Parameters
+        ----------
+        name : str
+            A fabric of the library.
+
         Raises
         ------
         InvalidInput

@@ -119,6 +119,11 @@ class Mesh:
     def transformed(self, matrix: ArrayLike) -> Mesh:
         """Return a copy with its vertices moved by a 4×4 matrix (row-major, acts on column vectors).
 
+        Parameters
+        ----------
+        matrix : (4, 4) array
+            The map of homogeneous coordinates; its upper 3 × 3 part may scale and mirror.
+
         Examples
         --------
         >>> import clothsim as cs, numpy as np
@@ -140,6 +145,17 @@ class Mesh:
 
         ``nx`` × ``ny`` vertices, row by row from −z to +z and within a row from −x to +x.
 
+        Parameters
+        ----------
+        width : float
+            Along x [m].
+        height : float
+            Along z [m].
+        nx : int
+            Vertices along x, ≥ 2.
+        ny : int
+            Vertices along z, ≥ 2.
+
         Examples
         --------
         >>> import clothsim as cs
@@ -150,37 +166,111 @@ class Mesh:
 
     @classmethod
     def disc(cls, radius: float, rings: int) -> Mesh:
-        """Make a flat disc [m] in the xz-plane, centred, normal +y, with UV in metres."""
+        """Make a flat disc [m] in the xz-plane, centred, normal +y, with UV in metres.
+
+        Parameters
+        ----------
+        radius : float
+            Radius [m].
+        rings : int
+            Rings of triangles about the middle, ≥ 1.
+        """
         return cls._made(_core.disc(radius, _whole("rings", rings)))
 
     @classmethod
     def ribbon(cls, length: float, width: float, nx: int, ny: int, twist: float = 0.0) -> Mesh:
-        """Make a strip along x [m], turned about x by ``twist`` [rad] from end to end; UV is the flat strip."""
+        """Make a strip along x [m], turned about x by ``twist`` [rad] from end to end; UV is the flat strip.
+
+        Parameters
+        ----------
+        length : float
+            Along x [m].
+        width : float
+            Across [m].
+        nx : int
+            Vertices along, ≥ 2.
+        ny : int
+            Vertices across, ≥ 2.
+        twist : float
+            Angle between the ends [rad], right-handed about x.
+        """
         return cls._made(_core.ribbon(length, width, _whole("nx", nx), _whole("ny", ny), twist))
 
     @classmethod
     def cylinder(cls, radius: float, height: float, segments: int, rows: int, *, caps: bool = False) -> Mesh:
-        """Make a cylinder about y, centred [m]: open with UV, or closed by caps without."""
+        """Make a cylinder about y, centred [m]: open with UV, or closed by caps without.
+
+        Parameters
+        ----------
+        radius : float
+            Radius [m].
+        height : float
+            Along y [m].
+        segments : int
+            Vertices around, ≥ 3.
+        rows : int
+            Rows of squares along, ≥ 1.
+        caps : bool
+            Close both ends.
+        """
         return cls._made(_core.cylinder(radius, height, _whole("segments", segments), _whole("rows", rows), caps))
 
     @classmethod
     def cone(cls, radius: float, height: float, segments: int) -> Mesh:
-        """Make a closed cone about y [m]: base at −height/2, apex at +height/2."""
+        """Make a closed cone about y [m]: base at −height/2, apex at +height/2.
+
+        Parameters
+        ----------
+        radius : float
+            Radius of the base [m].
+        height : float
+            Along y [m].
+        segments : int
+            Vertices around, ≥ 3.
+        """
         return cls._made(_core.cone(radius, height, _whole("segments", segments)))
 
     @classmethod
     def capsule(cls, radius: float, half_height: float, segments: int, rings: int) -> Mesh:
-        """Make a closed capsule about y [m]: a tube of length 2·``half_height`` with a half sphere at both ends."""
+        """Make a closed capsule about y [m]: a tube of length 2·``half_height`` with a half sphere at both ends.
+
+        Parameters
+        ----------
+        radius : float
+            Radius [m].
+        half_height : float
+            Half the length of the tube [m].
+        segments : int
+            Vertices around, ≥ 3.
+        rings : int
+            Rings of each half sphere, ≥ 1.
+        """
         return cls._made(_core.capsule(radius, half_height, _whole("segments", segments), _whole("rings", rings)))
 
     @classmethod
     def sphere(cls, radius: float, subdivisions: int = 4) -> Mesh:
-        """Make a sphere [m]: an icosahedron cut into four ``subdivisions`` times, 20·4ⁿ nearly equal triangles."""
+        """Make a sphere [m]: an icosahedron cut into four ``subdivisions`` times, 20·4ⁿ nearly equal triangles.
+
+        Parameters
+        ----------
+        radius : float
+            Radius [m].
+        subdivisions : int
+            How often each triangle is cut into four.
+        """
         return cls._made(_core.sphere(radius, _whole("subdivisions", subdivisions)))
 
     @classmethod
     def box(cls, size: tuple[float, float, float], cells: tuple[int, int, int] = (1, 1, 1)) -> Mesh:
-        """Make a closed box [m], centred, with ``cells`` squares of two triangles along each axis."""
+        """Make a closed box [m], centred, with ``cells`` squares of two triangles along each axis.
+
+        Parameters
+        ----------
+        size : (float, float, float)
+            Lengths along x, y and z [m].
+        cells : (int, int, int)
+            Squares along each axis, ≥ 1.
+        """
         return cls._made(_core.cuboid(list(size), [_whole("cells", count) for count in cells]))
 
     # Files -----------------------------------------------------------------------------------------------------
@@ -193,6 +283,11 @@ class Mesh:
         them, equal positions joined). Polygons are triangulated. UV is kept per corner, so seams do not cut the
         cloth. Groups of OBJ faces are kept. STL and glTF need trimesh, ``pip install 'clothsim[mesh]'``; USD needs
         usd-core, ``pip install 'clothsim[usd]'``.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; its suffix says the format.
 
         Raises
         ------
@@ -208,7 +303,13 @@ class Mesh:
             raise
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write OBJ (UV per corner, groups) or binary PLY (UV if each vertex has one), whole or not at all."""
+        """Write OBJ (UV per corner, groups) or binary PLY (UV if each vertex has one), whole or not at all.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, ``.obj`` or ``.ply``; replaced if it is there.
+        """
         where = Path(path)
         write_whole(where, _formats.write(where, RawMesh(self._vertices, self._triangles, self._uv, self._groups)))
 

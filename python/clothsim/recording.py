@@ -121,7 +121,13 @@ class Recording:
         return f"Recording({len(self)} frames of {', '.join(b.name for b in self.bodies)}{span})"
 
     def body(self, name: str) -> Body:
-        """Return the body of that name."""
+        """Return the body of that name.
+
+        Parameters
+        ----------
+        name : str
+            The body's name in the scene.
+        """
         for body in self.bodies:
             if body.name == name:
                 return body
@@ -129,13 +135,29 @@ class Recording:
         raise InvalidInput(f"body: expected one of {known}, got {name!r}", name="body")
 
     def positions(self, body: Body | str, frame: int) -> Floats:
-        """Positions [m] of a body in a frame, shape (n, 3); a copy."""
+        """Positions [m] of a body in a frame, shape (n, 3); a copy.
+
+        Parameters
+        ----------
+        body : Body or str
+            A body, or its name.
+        frame : int
+            Number of the frame; negative: from the end.
+        """
         found = self.body(body) if isinstance(body, str) else body
         where = self._slices[found.name]
         return np.array(self._standing[where] if found.static else self._moving[frame][where])
 
     def velocities(self, body: Body | str, frame: int) -> Floats | None:
-        """Velocities [m/s] of a cloth in a frame, shape (n, 3), a copy; None for a collider, or where none are kept."""
+        """Velocities [m/s] of a cloth in a frame, shape (n, 3), a copy; None for a collider, or where none are kept.
+
+        Parameters
+        ----------
+        body : Body or str
+            A body, or its name.
+        frame : int
+            Number of the frame; negative: from the end.
+        """
         found = self.body(body) if isinstance(body, str) else body
         if self._velocities is None or found.kind != "cloth":
             return None
@@ -160,6 +182,11 @@ class Recording:
         cloths joined, ``velocities`` (frames, n, 3) where they were kept; ``times`` (frames,);
         ``collider_0_positions`` (frames or 1 if static, n, 3) and ``collider_0_triangles`` each collider; ``meta`` a
         JSON text with names, ranges, fps and the up axis.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
         """
         with whole(Path(path)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
             for name, shape, rows in self._members():
@@ -200,6 +227,11 @@ class Recording:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Recording:
         """Read what `save` wrote.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
 
         Raises
         ------
@@ -258,37 +290,77 @@ class Recording:
             )  # fmt: skip
 
     def save_usd(self, path: str | os.PathLike[str]) -> None:
-        """Write a USD stage (``.usdc``, ``.usda``, ``.usd``): time-sampled meshes. Needs usd-core."""
+        """Write a USD stage (``.usdc``, ``.usda``, ``.usd``): time-sampled meshes. Needs usd-core.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        """
         from clothsim._export import usd
 
         usd.write(self, Path(path))
 
     def save_gltf(self, path: str | os.PathLike[str]) -> None:
-        """Write a binary glTF file (``.glb``) whose morph targets are the frames."""
+        """Write a binary glTF file (``.glb``) whose morph targets are the frames.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        """
         from clothsim._export import gltf
 
         gltf.write(self, Path(path))
 
     def save_pc2(self, folder: str | os.PathLike[str]) -> None:
-        """Write a mesh and a point cache (PC2) per body into a new folder."""
+        """Write a mesh and a point cache (PC2) per body into a new folder.
+
+        Parameters
+        ----------
+        folder : str or path
+            The folder.
+        """
         from clothsim._export import pc2
 
         pc2.write(self, Path(folder))
 
     def save_vtk(self, folder: str | os.PathLike[str]) -> None:
-        """Write VTK files and a ParaView collection, ``scene.pvd``, into a new folder. Needs PyVista."""
+        """Write VTK files and a ParaView collection, ``scene.pvd``, into a new folder. Needs PyVista.
+
+        Parameters
+        ----------
+        folder : str or path
+            The folder.
+        """
         from clothsim._export import vtk
 
         vtk.write(self, Path(folder))
 
     def save_sequence(self, folder: str | os.PathLike[str], suffix: str = "obj") -> None:
-        """Write one mesh file per frame and body into a new folder: ``<body>_0000.obj`` or ``.ply``."""
+        """Write one mesh file per frame and body into a new folder: ``<body>_0000.obj`` or ``.ply``.
+
+        Parameters
+        ----------
+        folder : str or path
+            The folder.
+        suffix : {"obj", "ply"}
+            The format.
+        """
         from clothsim._export import sequence
 
         sequence.write(self, Path(folder), suffix)
 
     def film_strip(self, path: str | os.PathLike[str], *, moments: int = 8) -> None:
-        """Render that many moments side by side into a PNG. Needs PyVista."""
+        """Render that many moments side by side into a PNG. Needs PyVista.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        moments : int
+            How many, ≥ 1; more of them where the cloth moves most.
+        """
         from clothsim._export import film_strip
 
         film_strip.write(self, Path(path), moments=moments)

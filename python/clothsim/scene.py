@@ -276,6 +276,11 @@ class Scene:
 
         Animated meshes are read as by `Animation.load`; start velocities are ``.npy`` files (n, 3).
 
+        Parameters
+        ----------
+        path : str or path
+            The scene file.
+
         Raises
         ------
         InvalidScene
@@ -332,6 +337,11 @@ class Scene:
         Meshes go to ``<scene>_<name>.ply`` (``.obj`` if a UV seam needs it), animations to ``.npz``, start velocities
         to ``.npy``. Names of files that the scene was loaded with are kept if it is saved into the same folder, else
         those files are written too. Each file is written whole or not at all, the scene last.
+
+        Parameters
+        ----------
+        path : str or path
+            The scene file.
         """
         where = Path(path)
         data = self.to_dict()

@@ -56,7 +56,15 @@ class Frame:
 
 
 class Plan(dict[str, Any]):
-    """Which effects run and why, as the tables of its JSON; ``print`` it for a table to read."""
+    """Which effects run and why, as the tables of its JSON; ``print`` it for a table to read.
+
+    Parameters
+    ----------
+    tables : dict
+        The plan as ``clothsim plan --json`` prints it.
+    text : str
+        The plan as ``clothsim plan`` prints it.
+    """
 
     def __init__(self, tables: dict[str, Any], text: str) -> None:
         super().__init__(tables)
@@ -292,6 +300,11 @@ class Simulation:
     def advance(self, seconds: float) -> None:
         """Advance by ``seconds`` [s] in equal steps of at most the scene's ``time.dt``.
 
+        Parameters
+        ----------
+        seconds : float
+            How far [s], ≥ 0.
+
         Raises
         ------
         SimulationDiverged, SimulationStuck
@@ -349,7 +362,13 @@ class Simulation:
             bar.close()
 
     def frame(self, index: int = 0) -> Frame:
-        """Return the state now, as a frame of that number."""
+        """Return the state now, as a frame of that number.
+
+        Parameters
+        ----------
+        index : int
+            The number that the frame gets.
+        """
         return Frame(index, self.time, self.positions, self.velocities, self.collider_positions)
 
     # State -----------------------------------------------------------------------------------------------------
@@ -466,6 +485,15 @@ class Simulation:
         """Go on from a checkpoint, to the same bits as if the run had not been interrupted.
 
         ``threads`` and ``device`` may be others than before, as for `Simulation`.
+
+        Parameters
+        ----------
+        path : str or path
+            What `save_checkpoint` wrote.
+        threads : int, optional
+            How many threads; all by default.
+        device : {"auto", "cpu", "gpu"}
+            Where to detect collisions.
 
         Raises
         ------

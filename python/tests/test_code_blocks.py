@@ -23,6 +23,7 @@ import clothsim as cs
 from clothsim import _core
 from clothsim._cli import main
 from clothsim.reproduce import find
+from clothsim.sweep.file import read as read_sweep
 
 PAGES = [page for page in pages() if any(True for _ in blocks(page))]
 LANGUAGES = {"python", "sh", "toml", "json", "text"}
@@ -35,6 +36,7 @@ QUICK = {
     "study": ["--repeats", "1", "--quiet"],
     "tune": ["--repeats", "1", "--quiet"],
     "stability": ["--quick", "--quiet"],
+    "sweep": ["--quiet"],
     "reproduce": ["--quick", "--quiet"],
 }
 # What is installed, built or measured for minutes: that the target or file is there is checked, not what it does.
@@ -71,6 +73,9 @@ def _run(block: Block, names: dict[str, Any]) -> None:
             exec(compile(block.text, str(block), "exec"), names)
     elif block.language == "json":
         json.loads(block.text)
+    elif block.language == "toml" and block.title and "[vary]" in block.text:
+        Path(block.title).write_text(block.text)
+        read_sweep(block.title)
     elif block.language == "toml" and block.title:
         Path(block.title).write_text(_without_pictures(block.text))
         cs.Scene.load(block.title)
@@ -104,6 +109,8 @@ def _command(words: list[str]) -> None:
     if name == "reproduce" and "-o" in words and words[2] != "4.7":
         find(words[2]).load()  # test_reproduce runs the quick variant of each
         return
+    if name == "sweep" and words[2].startswith("examples/"):
+        quick.append("--dry-run")
     if name == "run" and "--resume" not in words:
         quick.append("--overwrite")
     if name in ("study", "tune"):

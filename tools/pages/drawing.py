@@ -51,6 +51,20 @@ def run(scene: dict[str, Any] | cs.Scene, seconds: float, fps: float = 30.0, **o
     return cs.record(cs.Simulation(scene, device="cpu", **options), seconds, fps=fps, progress=False)
 
 
+def alone(recording: cs.Recording, frame: int) -> cs.Recording:
+    """That frame as a recording of its own, so that the camera comes as near as it allows."""
+    number = frame % len(recording)
+    moving = [recording.positions(body, number) for body in recording.bodies if not body.static]
+    standing = [recording.positions(body, number) for body in recording.bodies if body.static]
+    return cs.Recording(
+        recording.bodies,
+        recording.times[number : number + 1],
+        np.concatenate(moving)[None],
+        np.concatenate(standing) if standing else None,
+        up=recording.up,
+    )
+
+
 def tiles(shown: list[tuple[str, cs.Recording, int]]) -> bytes:
     """Render frames of recordings side by side, each with a caption below."""
     from PIL import Image, ImageDraw, ImageFont

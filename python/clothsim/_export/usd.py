@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +17,9 @@ from clothsim.recording import Body, Recording
 
 __all__ = ["body_colour", "vertex_normals", "write"]
 
+# Blocks of a disk that count as none where a write has failed.
+_FEW_BLOCKS = 8
+
 
 def write(recording: Recording, path: Path) -> None:
     """Write the stage, whole or not at all.
@@ -21,7 +28,7 @@ def write(recording: Recording, path: Path) -> None:
     ``primvars:st`` per corner in the cloth's UV. Metres, the scene's up axis, one time code per frame.
     """
     pxr = _Pxr()
-    with replacing(path) as part:
+    with replacing(path) as part, _as_os_errors(pxr, part):
         stage = pxr.Usd.Stage.CreateNew(str(part))
         world = pxr.UsdGeom.Xform.Define(stage, "/World")
         stage.SetDefaultPrim(world.GetPrim())
@@ -41,6 +48,19 @@ def write(recording: Recording, path: Path) -> None:
             pxr.UsdShade.MaterialBindingAPI.Apply(prim).Bind(material)
         stage.GetRootLayer().Save()
         del stage
+
+
+@contextlib.contextmanager
+def _as_os_errors(pxr: _Pxr, path: Path) -> Iterator[None]:
+    """USD says that a write failed, and not why."""
+    try:
+        yield
+    except pxr.Tf.ErrorException as error:
+        space = os.statvfs(path.parent)
+        if space.f_bavail < _FEW_BLOCKS:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error
+        words = " ".join(str(error).split())
+        raise OSError(errno.EIO, f"USD: {words}") from error
 
 
 def first_code(recording: Recording) -> int:

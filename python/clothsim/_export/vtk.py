@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -38,7 +39,7 @@ def write(recording: Recording, folder: Path, *, overwrite: bool = False) -> Non
                     velocities = recording.velocities(body, frame)
                     if velocities is not None:
                         surface.point_data["velocity"] = velocities
-                    surface.save(part / name, binary=True)
+                    (part / name).write_bytes(_bytes(surface))
                 time = repr(float(recording.times[frame]))
                 label = quoteattr(body.name)
                 entries.append(f'<DataSet timestep="{time}" part="{number}" name={label} file="{name}"/>')
@@ -48,6 +49,16 @@ def write(recording: Recording, folder: Path, *, overwrite: bool = False) -> Non
             "<Collection>", *entries, "</Collection>", "</VTKFile>", "",
         ]  # fmt: skip
         (part / "scene.pvd").write_text("\n".join(lines), encoding="utf-8")
+
+
+def _bytes(surface: Any) -> bytes:
+    """The file of a surface. VTK's own writing of files brings the process down where the disk is full."""
+    writer = optional("vtkmodules.vtkIOXML", extra="view", purpose="writing VTK files").vtkXMLPolyDataWriter()
+    writer.SetInputData(surface)
+    writer.SetDataModeToBinary()
+    writer.SetWriteToOutputString(True)
+    writer.Write()
+    return str(writer.GetOutputString()).encode()
 
 
 def _vertex_uv(body: Body) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]] | None:

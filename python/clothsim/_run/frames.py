@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from pathlib import Path
 from typing import IO, Any
 
@@ -11,15 +12,23 @@ import numpy as np
 
 from clothsim._arrays import Floats
 from clothsim._files import output_error
-from clothsim.errors import InvalidInput
+from clothsim.errors import CheckpointError
 
 __all__ = ["FrameWriter"]
 
 
 class FrameWriter:
-    """An append-only file of frames: rows of float64, one per frame, and one JSON line per frame beside it.
+    """An append-only file of frames: rows of float64, one per frame, and one line per frame beside it.
 
-    Rows that a crash left behind a checkpoint are cut off by ``keep``.
+    A line is JSON after the CRC-32 of the frame's row and of the JSON. Rows that a crash left behind a checkpoint are
+    cut off by ``keep``.
+
+    Raises
+    ------
+    CheckpointError
+        The first ``keep`` frames are not all there, or damaged.
+    OutputError
+        The files cannot be written.
     """
 
     def __init__(self, folder: Path, vertex_count: int, *, keep: int = 0) -> None:
@@ -28,28 +37,32 @@ class FrameWriter:
         self._stride = vertex_count * 24
         self._count = vertex_count
         self.frames = keep
-        self._rows = self._rows_path.open("r+b" if self._rows_path.exists() else "w+b")
-        self._lines = self._lines_path.open("r+b" if self._lines_path.exists() else "w+b")
-        self._cut(keep)
+        self._rows, self._lines = _open(self._rows_path), _open(self._lines_path)
+        try:
+            self._cut(keep)
+        except BaseException:
+            self.close()
+            raise
 
     def _cut(self, keep: int) -> None:
         lines = self._lines.read().split(b"\n")[:keep]
-        size = os.fstat(self._rows.fileno()).st_size
-        if len(lines) < keep or size < keep * self._stride:
-            raise InvalidInput(
-                f"{self._rows_path.parent}: expected {keep} frames as the checkpoint says, got fewer", name="OUT"
-            )
-        self._rows.truncate(keep * self._stride)
+        for number in range(keep):
+            row = self._rows.read(self._stride)
+            if number >= len(lines) or len(row) < self._stride or not _belongs(lines[number], row):
+                folder = self._rows_path.parent
+                raise CheckpointError(f"{folder}: frame {number} of {keep} is missing or damaged")
         self._rows.seek(keep * self._stride)
+        self._rows.truncate()
         text = b"".join(line + b"\n" for line in lines)
-        self._lines.truncate(len(text))
         self._lines.seek(len(text))
+        self._lines.truncate()
 
     def append(self, positions: Floats, facts: dict[str, Any]) -> None:
         """Add a frame: rows (n, 3), positions of what moves [m] and what may follow them, and facts about it."""
         try:
-            self._rows.write(np.ascontiguousarray(positions, dtype="<f8").tobytes())
-            self._lines.write(json.dumps(facts).encode() + b"\n")
+            row, line = np.ascontiguousarray(positions, dtype="<f8").tobytes(), json.dumps(facts).encode()
+            self._rows.write(row)
+            self._lines.write(b"%08x %s\n" % (_checksum(row, line), line))
             self._rows.flush()
             self._lines.flush()
         except OSError as error:
@@ -73,13 +86,30 @@ class FrameWriter:
     def facts(self) -> list[dict[str, Any]]:
         """What `append` was told about each frame."""
         with self._lines_path.open("rb") as file:
-            return [json.loads(line) for line in file.read().splitlines()[: self.frames]]
+            return [json.loads(line.partition(b" ")[2]) for line in file.read().splitlines()[: self.frames]]
 
     def rows(self) -> Floats:
         """All frames (frames, n, 3), mapped from the file, read-only."""
         if self.frames == 0 or self._count == 0:
             return np.zeros((self.frames, self._count, 3))
         return np.memmap(self._rows_path, dtype="<f8", mode="r", shape=(self.frames, self._count, 3))
+
+
+def _open(path: Path) -> IO[bytes]:
+    try:
+        return path.open("r+b" if path.exists() else "w+b")
+    except OSError as error:
+        raise output_error(path, error) from error
+
+
+def _checksum(row: bytes, line: bytes) -> int:
+    return zlib.crc32(line, zlib.crc32(row))
+
+
+def _belongs(text: bytes, row: bytes) -> bool:
+    """Whether a line and a row are those that were written together."""
+    checksum, _, line = text.partition(b" ")
+    return checksum == b"%08x" % _checksum(row, line)
 
 
 def _close(file: IO[bytes]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -16,12 +17,13 @@ import numpy as np
 
 from clothsim._device import check_device
 from clothsim._run.facts import FrameFacts
-from clothsim._run.folder import RunFolder, digest
+from clothsim._run.folder import RunFolder, digest, read_checkpoint
 from clothsim._run.frames import FrameWriter
 from clothsim._run.outputs import Outputs, check_packages
 from clothsim._run.start import Start
 from clothsim.errors import (
     CheckpointError,
+    ClothSimError,
     DeviceError,
     OutputExists,
     SimulationDiverged,
@@ -32,18 +34,48 @@ from clothsim.recording import Recording
 from clothsim.scene import Scene
 from clothsim.simulation import Simulation, frame_lengths, moving_positions, progress_bar, standing_positions
 
-__all__ = ["Job", "Stopped"]
+__all__ = ["Finished", "Job", "Stopped"]
+
+_logger = logging.getLogger(__name__)
 
 
 class Stopped(Exception):
-    """The run was stopped by a signal, after a checkpoint."""
+    """The run was stopped by a signal, or for a reason of its caller's, after a checkpoint."""
 
-    def __init__(self, signum: int, frames: int, total: int, seconds: float) -> None:
-        super().__init__(f"stopped by {signal.Signals(signum).name}")
+    def __init__(self, signum: int, frames: int, total: int, seconds: float, reason: str = "") -> None:
+        super().__init__(reason or f"stopped by {signal.Signals(signum).name}")
         self.signum = signum
         self.frames = frames
         self.total = total
         self.seconds = seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Finished:
+    """A run whose outputs are written, while everything is still at hand.
+
+    Attributes
+    ----------
+    recording : Recording
+        Its frames.
+    facts : list of dict
+        What is known about each frame: energy, counts, seconds.
+    simulation : Simulation
+        The state at the end.
+    error : ClothSimError or None
+        What stopped it before its end.
+    resumed_at : int
+        Frames that were there when this session began.
+    wall_seconds : float
+        Of all sessions [s].
+    """
+
+    recording: Recording
+    facts: list[dict[str, Any]]
+    simulation: Simulation
+    error: ClothSimError | None
+    resumed_at: int
+    wall_seconds: float
 
 
 @dataclass
@@ -70,6 +102,10 @@ class Job:
         The frame of another run to go on from; by default the scene's own start.
     progress : bool
         Show a bar.
+    should_stop : callable, optional
+        Asked after every frame; a reason in words stops the run after a checkpoint.
+    finished : callable, optional
+        Told of the run when its outputs are written, before the work folder goes.
     """
 
     scene: Scene
@@ -82,6 +118,8 @@ class Job:
     overwrite: bool = False
     progress: bool = True
     start: Start | None = None
+    should_stop: Callable[[], str | None] | None = None
+    finished: Callable[[Finished], None] | None = None
 
     def run(self) -> dict[str, Any]:
         """Simulate and write what the scene's ``[output]`` asks for; return the report without its frames.
@@ -167,7 +205,7 @@ class Job:
         fingerprint = self._digest()
         if not self.resume:
             folder.clear_work()
-        header, simulation = self._start(folder, fingerprint, simulation)
+        header, simulation, writer = self._start(folder, fingerprint, simulation)
         if self.progress and header["frames"] == 0:
             for warning in simulation.plan["warnings"]:
                 print(f"warning: {warning}", file=sys.stderr)
@@ -178,8 +216,6 @@ class Job:
         every = round(float(settings["checkpoint_interval"]) * fps)
         moving = sum(b.vertex_count for b in bodies if not b.static)
         with_velocities = bool(settings["velocities"])
-        cloth = sum(b.vertex_count for b in bodies if b.kind == "cloth")
-        writer = FrameWriter(folder.work, moving + cloth * with_velocities, keep=header["frames"])
         facts = FrameFacts(simulation, header)
 
         def checkpoint() -> None:
@@ -200,6 +236,9 @@ class Job:
                 self.out, settings, recording, lines, simulation, facts.wall_seconds(), error, fingerprint
             )
             report = outputs.write(progress=self.progress)
+            if self.finished is not None:
+                wall = facts.wall_seconds()
+                self.finished(Finished(recording, lines, simulation, error, header["frames"], wall))
         finally:
             writer.close()
         folder.remove_work()
@@ -217,7 +256,7 @@ class Job:
         every: int,
     ) -> SimulationDiverged | SimulationStuck | SolverFailed | None:
         """Go on to the last frame; return the error that stopped it before, if one did."""
-        core, bodies = simulation._core, simulation.bodies
+        core, bodies, already = simulation._core, simulation.bodies, writer.frames
         bar = progress_bar(len(lengths) + 1, initial=writer.frames, enabled=self.progress, name=self.scene.name)
         error: SimulationDiverged | SimulationStuck | SolverFailed | None = None
         try:
@@ -249,27 +288,62 @@ class Job:
                     if stopped:
                         checkpoint()
                         raise Stopped(signals.signum, writer.frames, len(lengths) + 1, simulation.time)
+                    if self.should_stop is not None and (reason := self.should_stop()) is not None:
+                        checkpoint()
+                        raise Stopped(0, writer.frames, len(lengths) + 1, simulation.time, reason)
                     if every > 0 and writer.frames % every == 0:
                         checkpoint()
-            checkpoint()
+            if writer.frames > already or error is not None:
+                checkpoint()
         finally:
             bar.close()
         return error
 
     def _start(
         self, folder: RunFolder, fingerprint: str, simulation: Simulation | None
-    ) -> tuple[dict[str, Any], Simulation]:
-        """Header of the checkpoint to go on from (or an empty one), and the simulation at its state."""
-        found = folder.load_checkpoint() if self.resume else None
-        if found is None:
-            return {"frames": 0, "steps": 0, "wall_seconds": 0.0}, simulation or self._new_simulation()
-        header, engine = found
-        if header.get("digest") != fingerprint:
-            raise CheckpointError(
-                f"{self.out}: the unfinished run is of another scene, or the scene or one of its meshes has changed; "
-                "--overwrite starts anew"
-            )
-        return header, Simulation._from_bytes(engine, self.threads, self.device)
+    ) -> tuple[dict[str, Any], Simulation, FrameWriter]:
+        """Header of the checkpoint to go on from (or an empty one), the simulation at its state, the frames until then.
+
+        Where the last checkpoint or frames that it counts are damaged, the one before serves.
+        """
+        damage: list[str] = []
+        for path in folder.checkpoints() if self.resume else []:
+            try:
+                header, engine = read_checkpoint(path)
+                if header.get("digest") != fingerprint:
+                    raise CheckpointError(
+                        f"{self.out}: the unfinished run is of another scene, or the scene or one of its meshes has "
+                        "changed; --overwrite starts anew"
+                    ) from _Other()
+                resumed = Simulation._from_bytes(engine, self.threads, self.device)
+                writer = self._writer(folder, resumed, header["frames"])
+            except CheckpointError as error:
+                if isinstance(error.__cause__, _Other):
+                    raise
+                damage.append(str(error))
+                continue
+            if damage:
+                text = f"{'; '.join(damage)}. Going on from the checkpoint before, at {resumed.time:g} s"
+                _logger.warning("%s", text)
+                if self.progress:
+                    print(f"warning: {text}", file=sys.stderr)
+            return header, resumed, writer
+        if damage:
+            raise CheckpointError(f"{'; '.join(damage)}. There is no other checkpoint; --overwrite starts anew")
+        simulation = simulation or self._new_simulation()
+        return {"frames": 0, "steps": 0, "wall_seconds": 0.0}, simulation, self._writer(folder, simulation, 0)
+
+    def _writer(self, folder: RunFolder, simulation: Simulation, keep: int) -> FrameWriter:
+        """The frames in the work folder: rows of what moves, then velocities if they are kept."""
+        bodies = simulation.bodies
+        rows = sum(b.vertex_count for b in bodies if not b.static)
+        if self.scene.output["velocities"]:
+            rows += sum(b.vertex_count for b in bodies if b.kind == "cloth")
+        return FrameWriter(folder.work, rows, keep=keep)
+
+
+class _Other(Exception):
+    """A checkpoint is whole and belongs to another scene: the one before does so too."""
 
 
 class _Signals:

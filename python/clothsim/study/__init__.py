@@ -39,6 +39,11 @@ def metric_names() -> list[str]:
 def load(folder: str | os.PathLike[str]) -> Study:
     """Read a study that was written into a folder, for plots and tables of your own.
 
+    Parameters
+    ----------
+    folder : str or path
+        The folder that ``out`` named.
+
     Raises
     ------
     InvalidInput

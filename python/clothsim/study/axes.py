@@ -125,8 +125,8 @@ def axis_kind(key: str) -> str:
     return "numerical" if key in _NUMERIC_ONLY else "physical"
 
 
-def axis(name: str, values: Any) -> Axis:
-    """Check an axis given by name and values.
+def axis(name: str, values: Any, *, most: int = _MOST_VALUES, once: bool = True) -> Axis:
+    """Check an axis given by name and values: at most so many, and each ``once``.
 
     Raises
     ------
@@ -143,14 +143,14 @@ def axis(name: str, values: Any) -> Axis:
     if isinstance(values, (str, Mapping)) or not isinstance(values, (Sequence, np.ndarray)):
         values = [values]
     found = tuple(v.item() if isinstance(v, np.generic) else v for v in values)
-    if not found or len(found) > _MOST_VALUES:
-        expected = f"1 to {_MOST_VALUES} values"
+    if not found or len(found) > most:
+        expected = f"1 to {most} values"
         raise InvalidInput(f"axis {name}: expected {expected}, got {len(found)}", name=name, expected=expected)
     texts = [value_text(v) for v in found]
     if wild := [t for t, v in zip(texts, found, strict=True) if isinstance(v, float) and not math.isfinite(v)]:
         raise InvalidInput(f"axis {name}: expected finite numbers, got {', '.join(wild)}", name=name, got=wild[0])
     twice = sorted({t for t in texts if texts.count(t) > 1})
-    if twice:
+    if once and twice:
         raise InvalidInput(f"axis {name}: expected each value once, got {', '.join(twice)} twice", name=name)
     return Axis(name, key, found)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -95,10 +96,17 @@ class StudyFolder(RunFolder):
     def _digest_file(self) -> Path:
         return self.work / _STUDY
 
+    @property
+    def word(self) -> Path:
+        """The file that makes the work folder an unfinished study."""
+        return self._digest_file
+
     def claim(self, digest: str, *, overwrite: bool) -> None:
         """Say whose the work folder is, with the folder locked; forget the results of another study."""
         if overwrite or (self._digest_file.exists() and self._digest_file.read_text() != digest):
             for path in self.work.iterdir():
-                if path.name != "lock":
+                if path.is_dir():
+                    shutil.rmtree(path)
+                elif path.name != "lock":
                     path.unlink()
         write_whole(self._digest_file, digest.encode())

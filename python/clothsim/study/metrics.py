@@ -151,7 +151,7 @@ def _stick(state: State) -> float | None:
     if not lies.any():
         return None
     way = np.linalg.norm(state.x_end[free] - state.x_late[free], axis=1)[lies]
-    late = 0.25 * float(state.times[-1])
+    late = state.facts.get("late_seconds", 0.25 * float(state.times[-1]))
     return float(way.max() / late)
 
 

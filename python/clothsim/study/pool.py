@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from clothsim._files import write_whole
+from clothsim.errors import OutputError
+from clothsim.study.process import UNWRITTEN
 
 __all__ = ["Job", "cores", "load", "run_jobs"]
 
@@ -81,6 +84,11 @@ def run_jobs(jobs: Sequence[Job], processes: int | None, limit: float | None, pr
         Seconds after which a run is stopped.
     progress : callable
         Called after each.
+
+    Raises
+    ------
+    OutputError
+        A result could not be written; the other runs are stopped. Those that have finished are kept.
     """
     free = cores()
     total = len(free)
@@ -113,6 +121,8 @@ def run_jobs(jobs: Sequence[Job], processes: int | None, limit: float | None, pr
                 if process.poll() is None:
                     _stop(process)
                     _fail(job, f"stopped after {limit:g} s", "TimeLimit")
+                elif process.returncode == UNWRITTEN:
+                    raise OutputError(errno.ENOSPC, _last_words(job) or f"cannot write {job.path}")
                 elif not job.done:
                     _fail(job, _reason(job, process), "ProcessFailed")
                 _tidy(job, process)
@@ -164,7 +174,12 @@ def _fail(job: Job, message: str, kind: str) -> None:
 
 
 def _reason(job: Job, process: subprocess.Popen[bytes]) -> str:
-    lines = job.path.with_suffix(".stderr").read_text(errors="replace").strip().splitlines()
     code = process.returncode
     how = f"signal {-code}" if code < 0 else f"exit code {code}"
-    return f"the run's process ended with {how}" + (f": {lines[-1]}" if lines else "")
+    words = _last_words(job)
+    return f"the run's process ended with {how}" + (f": {words}" if words else "")
+
+
+def _last_words(job: Job) -> str:
+    lines = job.path.with_suffix(".stderr").read_text(errors="replace").strip().splitlines()
+    return lines[-1] if lines else ""

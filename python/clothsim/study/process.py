@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,9 +14,12 @@ from typing import Any
 import numpy as np
 
 from clothsim._files import whole, write_whole
-from clothsim.errors import ClothSimError
+from clothsim.errors import ClothSimError, OutputError
 
-__all__ = ["serve"]
+__all__ = ["UNWRITTEN", "die_with_parent", "serve"]
+
+# Exit code of a process whose result could not be written (EX_IOERR of sysexits.h).
+UNWRITTEN = 74
 
 
 def serve(path: Path, run: Callable[[dict[str, Any]], tuple[dict[str, Any], Mapping[str, Any]]]) -> int:
@@ -27,7 +32,7 @@ def serve(path: Path, run: Callable[[dict[str, Any]], tuple[dict[str, Any], Mapp
     run : callable
         Takes the job, returns facts for JSON and arrays by name.
     """
-    _die_with_parent()
+    die_with_parent()
     job = json.loads(path.read_bytes())
     if job["cores"] and hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, job["cores"])
@@ -36,13 +41,25 @@ def serve(path: Path, run: Callable[[dict[str, Any]], tuple[dict[str, Any], Mapp
         if arrays:
             with whole(path.with_suffix(".npz")) as file:
                 np.savez(file, **arrays)
+    except OutputError as error:
+        return _unwritten(error)
     except (ClothSimError, MemoryError) as error:
         facts = {"error": str(error) or type(error).__name__, "error_type": type(error).__name__}
-    write_whole(path.with_suffix(".result"), json.dumps(facts).encode())
+    try:
+        write_whole(path.with_suffix(".result"), json.dumps(facts).encode())
+    except OutputError as error:
+        return _unwritten(error)
     return 0
 
 
-def _die_with_parent() -> None:
+def _unwritten(error: OutputError) -> int:
+    """Say why there is no result: nothing is wrong with the run, and it can be made again."""
+    with contextlib.suppress(OSError):
+        sys.stderr.write(f"{error.strerror}\n")
+    return UNWRITTEN
+
+
+def die_with_parent() -> None:
     """End when the parent does, however it ends: its end of the pipe closes."""
 
     def watch() -> None:

@@ -154,10 +154,18 @@ class Study:
         Where it ran.
     command : str
         How to run it again.
+    digest : str
+        Fingerprint of the scene and of what was asked.
+    duration : float
+        Simulated time of a run [s].
     out : Path or None
         Where it was written.
+    files : list of Path
+        What was written.
     seconds : float
         Wall-clock time of all.
+    per_point : int
+        Runs of each point: more than one with seeds.
     """
 
     name: str
@@ -186,7 +194,15 @@ class Study:
         return self.metrics[0]
 
     def own_error(self, row: Row, metric: str | None = None) -> float:
-        """How far the reference of a row may itself be off; 0 where the metric needs none."""
+        """How far the reference of a row may itself be off; 0 where the metric needs none.
+
+        Parameters
+        ----------
+        row : Row
+            A row of this study.
+        metric : str, optional
+            A metric's name; by default the one of the front.
+        """
         name = metric or self.metric.name
         for problem, reference in self.references:
             if all(row.settings.get(k) == v for k, v in problem.items()):

@@ -52,6 +52,8 @@ class Tuned:
         In words.
     frames : float
         What a run's cost is divided by.
+    files : list of Path
+        What was written.
     """
 
     goal: Goal

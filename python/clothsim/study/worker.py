@@ -24,7 +24,7 @@ from clothsim.study.disturb import disturbed
 from clothsim.study.process import serve
 from clothsim.study.state import pinned
 
-__all__ = ["pack_scene", "run_job"]
+__all__ = ["LATE", "joined", "pack_scene", "run_job", "unpack_scene"]
 
 # Share of the run after which what sticks is watched.
 LATE = 0.75
@@ -42,8 +42,9 @@ def pack_scene(scene: Scene) -> bytes:
     return pickle.dumps((meshes, sequences, velocities, str(scene.folder) if scene.folder else None))
 
 
-def _unpack(path: Path, data: dict[str, Any]) -> Scene:
-    meshes, sequences, velocities, folder = pickle.loads(path.read_bytes())  # our own file, in our work folder
+def unpack_scene(packed: bytes, data: dict[str, Any]) -> Scene:
+    """The scene that was packed, by ourselves, with tables of its own."""
+    meshes, sequences, velocities, folder = pickle.loads(packed)
     scene = Scene()
     scene._meshes = {name: Mesh(*arrays) for name, arrays in meshes.items()}
     scene._sequences, scene._velocities = sequences, velocities
@@ -65,7 +66,7 @@ def run_job(job: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
     else:
         steps = max(1, int(np.ceil(duration / float(dt) - 1e-9)))
         data["time"]["dt"] = duration / steps
-    scene = _unpack(Path(job["scene"]), data)
+    scene = unpack_scene(Path(job["scene"]).read_bytes(), data)
     threads, device = job["threads"], job["device"]
     if job["seed"] is not None:
         scene = disturbed(scene, job["seed"], job["disturbance"])
@@ -137,7 +138,7 @@ def _observe(
     x, v = simulation.positions, simulation.velocities
     arrays: dict[str, Any] = {
         "x_start": x, "v_start": v, "masses": simulation.masses,
-        "triangles": _joined(cloths), "collider_triangles": _joined(colliders),
+        "triangles": joined(cloths), "collider_triangles": joined(colliders),
         "collider_start": simulation.collider_positions, "pinned": pinned(data, cloths, x),
         "counts": np.array([b.vertex_count for b in cloths]),
     }  # fmt: skip
@@ -171,7 +172,8 @@ def _observe(
     return facts, arrays
 
 
-def _joined(bodies: list[Any]) -> Any:
+def joined(bodies: list[Any]) -> Any:
+    """Triangles of all bodies, with indices into all their vertices."""
     first, out = 0, [np.zeros((0, 3), dtype=np.int64)]
     for body in bodies:
         out.append(np.asarray(body.triangles) + first)

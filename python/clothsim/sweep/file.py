@@ -1,0 +1,140 @@
+"""SWEEP.toml: what runs, what varies, what is kept."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from clothsim import _core
+from clothsim.errors import ClothSimError, InvalidInput
+from clothsim.scene import Scene
+from clothsim.study.axes import NAMED
+from clothsim.sweep.draws import KINDS
+from clothsim.sweep.request import Request
+
+__all__ = ["SweepFile", "read"]
+
+_KEYS = (
+    "name", "scene", "set", "vary", "combine", "seeds", "metrics", "series", "keep", "timeout", "retries", "threads",
+    "device", "checkpoint_interval",
+)  # fmt: skip
+_SEED_KEYS = ("count", "first", "disturbance", "draw")
+
+
+@dataclass(frozen=True)
+class SweepFile:
+    """What a file asks for: the sweep, and how often a run whose worker was lost is started again."""
+
+    request: Request
+    retries: int | None
+
+
+def read(path: str | os.PathLike[str], fixed: Mapping[str, Any] | None = None) -> SweepFile:
+    """Read a sweep; ``fixed`` goes before its ``[set]``.
+
+    Raises
+    ------
+    InvalidInput, InvalidScene
+        The file cannot be read, or asks for what there is not; file and key are named.
+    """
+    where = Path(path)
+    try:
+        tables = tomllib.loads(where.read_bytes().decode("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidInput(f"{where}: cannot read the sweep: {reason}", name="SWEEP") from error
+    try:
+        return _made(tables, where, dict(fixed or {}))
+    except InvalidInput as error:
+        raise InvalidInput(f"{where}: {error}", name=error.name, expected=error.expected, got=error.got) from error
+
+
+def _made(tables: dict[str, Any], where: Path, fixed: dict[str, Any]) -> SweepFile:
+    _known("", tables, _KEYS)
+    seeds = _table(tables, "seeds")
+    _known("seeds.", seeds, _SEED_KEYS)
+    if "seeds" in tables and "count" not in seeds:
+        raise InvalidInput("seeds.count: expected a whole number ≥ 1, got nothing", name="seeds.count")
+    same = ("name", "combine", "metrics", "series", "keep", "timeout", "threads", "device", "checkpoint_interval")
+    given = {key: tables[key] for key in same if key in tables}
+    renamed = {"count": "seeds", "first": "seed", "disturbance": "disturbance"}
+    given |= {name: seeds[key] for key, name in renamed.items() if key in seeds}
+    request = Request(
+        _scenes(tables.get("scene"), where),
+        _flat(_table(tables, "vary"), _is_row),
+        fixed={**_flat(_table(tables, "set"), lambda _: False), **fixed},
+        draws=_flat(_table(seeds, "draw", "seeds."), _is_draw),
+        **given,
+    )
+    return SweepFile(request, tables.get("retries"))
+
+
+def _known(prefix: str, table: Mapping[str, Any], keys: tuple[str, ...]) -> None:
+    for key in table:
+        if key not in keys:
+            close = difflib.get_close_matches(key, keys, n=1, cutoff=0.5)
+            hint = f' (did you mean "{close[0]}"?)' if close else ""
+            expected = f"one of the keys {', '.join(keys)}"
+            raise InvalidInput(
+                f'{prefix}{key}: expected {expected}, got the unknown key "{key}"{hint}', name=prefix + key, got=key
+            )
+
+
+def _table(tables: Mapping[str, Any], key: str, prefix: str = "") -> dict[str, Any]:
+    table = tables.get(key, {})
+    if not isinstance(table, dict):
+        raise InvalidInput(f"{prefix}{key}: expected a table, got {table!r}", name=prefix + key)
+    return table
+
+
+def _is_row(value: Mapping[str, Any]) -> bool:
+    return "first" in value and "last" in value
+
+
+def _is_draw(value: Mapping[str, Any]) -> bool:
+    return len(value) == 1 and not isinstance(next(iter(value.values())), Mapping) and bool(
+        difflib.get_close_matches(next(iter(value)), KINDS, n=1, cutoff=0.5)
+    )  # fmt: skip
+
+
+def _flat(table: Mapping[str, Any], is_leaf: Any, prefix: str = "") -> dict[str, Any]:
+    """Tables of tables as paths: ``contact.friction`` may be written with and without quotes."""
+    out: dict[str, Any] = {}
+    for key, value in table.items():
+        leaf = not isinstance(value, Mapping) or is_leaf(value) or "." in key or (not prefix and key in NAMED)
+        if not leaf:
+            out |= _flat(value, is_leaf, f"{prefix}{key}.")
+        else:
+            out[prefix + key] = value
+    return out
+
+
+def _scenes(given: Any, where: Path) -> dict[str, Scene]:
+    if isinstance(given, dict):
+        return {"": _inline(given, where)}
+    paths = [given] if isinstance(given, str) else given
+    if not isinstance(paths, list) or not paths or not all(isinstance(p, str) for p in paths):
+        expected = "the path of a scene, a list of them, or a table [scene]"
+        got = "nothing" if given is None else repr(given)
+        raise InvalidInput(f"scene: expected {expected}, got {got}", name="scene", expected=expected, got=got)
+    if twice := sorted({p for p in paths if paths.count(p) > 1}):
+        raise InvalidInput(f"scene: expected each once, got {', '.join(twice)} twice", name="scene")
+    return {path if len(paths) > 1 else "": Scene.load(where.parent / path) for path in paths}
+
+
+def _inline(tables: dict[str, Any], where: Path) -> Scene:
+    try:
+        scene = Scene()
+        scene.folder = where.parent
+        scene._core = _core.Scene.from_json(json.dumps(tables))
+        scene._data = json.loads(scene._core.to_json())
+        scene._load_files()
+    except (ClothSimError, TypeError) as error:
+        raise InvalidInput(f"scene: {error}", name="scene") from error
+    return scene
