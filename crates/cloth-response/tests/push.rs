@@ -43,9 +43,10 @@ fn a_push_leaves_no_velocity_and_takes_its_time() {
             let fastest = world.v.iter().map(|v| v.norm()).fold(0.0, f64::max);
             assert!(fastest < ROUNDING + TOLERANCE * f64::from(steps), "dt {dt}: {fastest} m/s");
         }
-        // 40 ms of 50: 1 − e^−0.8 = 0.55 of the overlap of 3 mm is undone, whatever the step; corners that lie over nothing stay.
+        // 40 ms of 50: 1 − e^−0.8 = 0.55 of the overlap of 3 mm is undone at most, whatever the step; corners beyond the other's
+        // border move alone, so that means are less.
         for gap in gaps(&world) {
-            assert!((0.0020..0.0029).contains(&gap), "dt {dt}: {gap}");
+            assert!((0.0015..0.0029).contains(&gap), "dt {dt}: {gap}");
         }
         let mass = |b: usize| world.body(b).map(|i| 1.0 / world.inv_mass[i]).sum::<f64>();
         let rise = |b: usize, y: f64| {
