@@ -79,7 +79,7 @@ validation: build ## Compare with exact solutions and measured fabrics (minutes)
 stability: build ## Run the stability atlas, every case over its whole map (minutes); writes stability/
 	$(BIN)/clothsim stability -o stability --overwrite
 
-kills: build ## Kill a run 100 times and a sweep's workers 16 times at random (10 minutes); every byte has to be the same
+kills: build ## Kill a run 100 times and a sweep's workers 16 times at random (a quarter of an hour); compare every byte
 	$(BIN)/python tools/kills.py --kills 100
 	$(BIN)/python tools/lost_workers.py --runs 64 --kills 16
 
