@@ -12,6 +12,7 @@ have_lib() { ldconfig -p | grep -q "$1"; }
 missing=()
 command -v cc >/dev/null || missing+=(gcc libc6-dev)                 # the linker that cargo calls
 have_lib 'libGL\.so\.1' || missing+=(libgl1)                         # VTK, for the pictures
+command -v chromium >/dev/null || missing+=(chromium)                 # the tests of the page for browsers
 have_lib 'libEGL\.so\.1' || missing+=(libegl1)                       # VTK off screen
 have_lib 'libXrender\.so\.1' || missing+=(libxrender1)               # VTK
 ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 || missing+=(mesa-vulkan-drivers)   # a Vulkan adapter in software

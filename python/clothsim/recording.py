@@ -19,7 +19,7 @@ from clothsim._arrays import Floats, Ints
 from clothsim._files import whole
 from clothsim.errors import InvalidInput
 
-__all__ = ["Body", "Recording", "body_facts"]
+__all__ = ["Body", "Recording", "body_facts", "flattened"]
 
 _FORMAT = 1
 
@@ -42,6 +42,9 @@ class Body:
         Material coordinates per corner [m].
     static : bool
         It stands still: its positions are the same in all frames.
+    rest : {"uv", "start"} or (m, 3, 2) float64 or None
+        The undeformed shape of a cloth: its ``uv``; its positions in the first frame; per triangle, the corners in the
+        triangle's own plane [m]; None where it is not known.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Body:
     triangles: Ints
     uv: Floats | None = None
     static: bool = False
+    rest: Literal["uv", "start"] | Floats | None = None
 
 
 class Recording:
@@ -73,6 +77,8 @@ class Recording:
         The axis that points up.
     name : str
         The scene's name.
+    thickness : float, optional
+        Distance up to which two surfaces were in contact [m]; None where there was no contact, or it is not known.
 
     Examples
     --------
@@ -94,12 +100,14 @@ class Recording:
         fps: float = 60.0,
         up: str = "y",
         name: str = "",
+        thickness: float | None = None,
     ) -> None:
         self.bodies = tuple(bodies)
         self.times = np.asarray(times, dtype=np.float64)
         self.fps = float(fps)
         self.up = up
         self.name = name
+        self.thickness = thickness
         self._moving = moving
         self._standing = np.zeros((0, 3)) if standing is None else standing
         self._velocities = velocities
@@ -163,6 +171,30 @@ class Recording:
             return None
         return np.array(self._velocities[frame][self._slices[found.name]])
 
+    def rest(self, body: Body | str) -> Floats | None:
+        """Undeformed shape of a cloth: corners of each triangle in a plane of its own [m], shape (m, 3, 2).
+
+        Lengths and angles count; where and how a triangle lies in its plane does not.
+
+        Parameters
+        ----------
+        body : Body or str
+            The cloth, or its name.
+
+        Returns
+        -------
+        (m, 3, 2) float64 or None
+            None for a collider, or where the undeformed shape is not known.
+        """
+        found = self.body(body) if isinstance(body, str) else body
+        if found.kind != "cloth" or found.rest is None:
+            return None
+        if isinstance(found.rest, np.ndarray):
+            return np.array(found.rest)
+        if found.rest == "uv":
+            return None if found.uv is None else np.array(found.uv)
+        return flattened(self.positions(found, 0), found.triangles) if len(self) else None
+
     @property
     def has_velocities(self) -> bool:
         """Whether velocities were kept."""
@@ -180,8 +212,9 @@ class Recording:
 
         ``positions`` (frames, n, 3), ``triangles`` (m, 3) and ``uv`` (m, 3, 2; NaN where a cloth has none) hold all
         cloths joined, ``velocities`` (frames, n, 3) where they were kept; ``times`` (frames,);
-        ``collider_0_positions`` (frames or 1 if static, n, 3) and ``collider_0_triangles`` each collider; ``meta`` a
-        JSON text with names, ranges, fps and the up axis.
+        ``collider_0_positions`` (frames or 1 if static, n, 3) and ``collider_0_triangles`` each collider; ``rest_0``
+        (m, 3, 2) the undeformed shape of a cloth where it is neither its ``uv`` nor the first frame; ``meta`` a JSON
+        text with names, ranges, fps, the up axis and the thickness.
 
         Parameters
         ----------
@@ -205,6 +238,9 @@ class Recording:
         if any(b.uv is not None for b in cloth):
             uv = [np.full((len(b.triangles), 3, 2), np.nan) if b.uv is None else b.uv for b in cloth]
             yield "uv", np.concatenate(uv), ()
+        for index, body in enumerate(cloth):
+            if isinstance(body.rest, np.ndarray):
+                yield f"rest_{index}", body.rest, ()
         for index, body in enumerate(b for b in self.bodies if b.kind == "collider"):
             where = self._slices[body.name]
             if body.static:
@@ -216,9 +252,11 @@ class Recording:
             yield f"collider_{index}_triangles", body.triangles, ()
         meta = {
             "format": _FORMAT, "name": self.name, "fps": self.fps, "up": self.up, "units": "m, s",
+            "thickness": self.thickness,
             "bodies": [
                 {"name": b.name, "kind": b.kind, "vertex_count": b.vertex_count, "static": b.static,
-                 "triangle_count": len(b.triangles), "uv": b.uv is not None}
+                 "triangle_count": len(b.triangles), "uv": b.uv is not None,
+                 "rest": "array" if isinstance(b.rest, np.ndarray) else b.rest}
                 for b in self.bodies
             ],
         }  # fmt: skip
@@ -271,7 +309,10 @@ class Recording:
                 if entry["kind"] == "cloth":
                     rows = slice(first_triangle, first_triangle + m)
                     uv = data["uv"][rows] if entry["uv"] else None
-                    bodies.append(Body(entry["name"], "cloth", n, data["triangles"][rows] - first_vertex, uv))
+                    rest = entry.get("rest")
+                    rest = data[f"rest_{len(bodies)}"] if rest == "array" else rest
+                    triangles = data["triangles"][rows] - first_vertex
+                    bodies.append(Body(entry["name"], "cloth", n, triangles, uv, rest=rest))
                     first_vertex += n
                     first_triangle += m
                     continue
@@ -286,7 +327,7 @@ class Recording:
             return cls(
                 bodies, data["times"], np.concatenate(moving, axis=1), np.concatenate(standing),
                 velocities=data.get("velocities"),
-                fps=meta["fps"], up=meta["up"], name=meta["name"],
+                fps=meta["fps"], up=meta["up"], name=meta["name"], thickness=meta.get("thickness"),
             )  # fmt: skip
 
     def save_usd(self, path: str | os.PathLike[str]) -> None:
@@ -366,6 +407,20 @@ class Recording:
         film_strip.write(self, Path(path), moments=moments)
 
 
+def flattened(x: Floats, triangles: Ints) -> Floats:
+    """Each triangle of vertices ``x`` (n, 3) laid into a plane of its own [m], shape (m, 3, 2).
+
+    Its first corner is the origin, its first side the axis u: lengths and angles are kept.
+    """
+    side, other = x[triangles[:, 1]] - x[triangles[:, 0]], x[triangles[:, 2]] - x[triangles[:, 0]]
+    length = np.linalg.norm(side, axis=1)
+    along = np.einsum("ij,ij->i", side, other) / np.where(length > 0.0, length, 1.0)
+    across = np.linalg.norm(np.cross(side, other), axis=1) / np.where(length > 0.0, length, 1.0)
+    flat = np.zeros((len(triangles), 3, 2))
+    flat[:, 1, 0], flat[:, 2, 0], flat[:, 2, 1] = length, along, across
+    return flat
+
+
 def _slices(bodies: Sequence[Body]) -> dict[str, slice]:
     """Where each body lies in the array of the moving or of the static ones."""
     at = {True: 0, False: 0}
@@ -398,4 +453,5 @@ def body_facts(body: Body) -> dict[str, Any]:
     facts = asdict(body)
     facts["triangle_count"] = len(facts.pop("triangles"))
     facts.pop("uv")
+    facts.pop("rest")
     return facts

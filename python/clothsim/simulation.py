@@ -8,7 +8,7 @@ import logging
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from clothsim import _core
 from clothsim._arrays import Floats, Ints, number, optional
 from clothsim._device import check_device, check_threads
 from clothsim._files import write_whole
+from clothsim._scene_facts import contact_thickness, rest_source
 from clothsim.errors import CheckpointError, InvalidInput
 from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
@@ -417,18 +418,16 @@ class Simulation:
     @property
     def bodies(self) -> list[Body]:
         """Names and meshes of all bodies, cloth first, in scene order."""
-        moving = self._moving_colliders()
+        scene = json.loads(self._core.scene())
+        moving = {c["name"] for c in scene["collider"] if c.get("keyframes") or c.get("sequence")}
+        rests = {c["name"]: rest_source(scene, c) for c in scene["cloth"]}
         bodies = []
         for name, kind, (first, last), (_, triangles, uv) in self._core.bodies():
             if kind == "cloth":
-                bodies.append(Body(name, "cloth", last - first, triangles, uv))
+                bodies.append(Body(name, "cloth", last - first, triangles, uv, rest=rests[name]))
             else:
                 bodies.append(Body(name, "collider", last - first, triangles, uv, name not in moving))
         return bodies
-
-    def _moving_colliders(self) -> set[str]:
-        colliders = json.loads(self._core.scene())["collider"]
-        return {c["name"] for c in colliders if c.get("keyframes") or c.get("sequence")}
 
     @property
     def hinges(self) -> Hinges:
@@ -567,6 +566,8 @@ def record(
     Recording(3 frames of cloth, 0 s to 0.1 s)
     """
     bodies = simulation.bodies
+    if simulation.time > 0.0:  # the first frame is not the scene's start
+        bodies = [replace(body, rest=None) if body.rest == "start" else body for body in bodies]
     scene = json.loads(simulation._core.scene())
     rows, times, velocities = [], [], []
     standing = standing_positions(bodies, simulation.collider_positions)
@@ -577,6 +578,7 @@ def record(
     return Recording(
         bodies, np.array(times), np.array(rows), standing,
         velocities=np.array(velocities), fps=fps, up=scene["up"], name=scene["name"],
+        thickness=contact_thickness(scene),
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@
 mod support;
 
 use cloth_collision::{
-    Adapt, BruteForce, Bvh, CollisionMesh, Contacts, Detector, FrameKind, Frames, Mode, Query,
+    Adapt, Body, BruteForce, Bvh, CollisionMesh, Contacts, Detector, FrameKind, Frames, Mode, Query,
     SessionOptions, SkippingSession, Variant, Vec3,
 };
 use support::{Random, along, bodies, layers, pool, sheet, soup, waves};
@@ -207,6 +207,37 @@ fn dangling_triangles_agree_in_both_ways() {
         now = next;
     }
     let seen = compare(&mesh, &frames, false, "dangling");
+    assert!(seen.one_by_one > 5 && seen.all_at_once > 5 && seen.contacts > 1000, "{seen:?}");
+}
+
+/// Features get boxes only where bodies meet: what comes near later, as all slide and some vertices jump, is found none the less.
+#[test]
+fn bodies_that_do_not_meet_themselves_agree() {
+    let mut random = Random(15);
+    let (x, triangles) = layers(20, &mut random);
+    let (half, count) = (x.len() / 2, triangles.len() / 2);
+    let upper: Vec<[u32; 3]> = triangles[count..].iter().map(|t| t.map(|v| v - half as u32)).collect();
+    let body = |dynamic| Body { dynamic, self_collision: false };
+    let mesh =
+        CollisionMesh::new(&[(body(true), half, &triangles[..count]), (body(false), half, &upper)]).unwrap();
+    // The upper sheet covers a third of the lower one.
+    let wave = waves(&x, 0.002);
+    let path = |k: usize| {
+        let mut x = wave(k);
+        x[half..].iter_mut().for_each(|p| p.x += 0.65 - 0.004 * k as f64);
+        x
+    };
+    let mut frames = vec![];
+    let mut now = path(0);
+    for k in 0..24 {
+        let mut next = path(k + 1);
+        for _ in 0..[0, 1, 20, 150][k % 4] {
+            next[random.below(x.len())] += random.vector(0.4);
+        }
+        frames.push([now, next.clone()]);
+        now = next;
+    }
+    let seen = compare(&mesh, &frames, false, "bodies apart from themselves");
     assert!(seen.one_by_one > 5 && seen.all_at_once > 5 && seen.contacts > 1000, "{seen:?}");
 }
 

@@ -245,7 +245,7 @@ fn devices_and_detectors_that_do_not_go_together_are_refused() {
     let detection =
         |detector, device| build(detector, device, &SHARED).unwrap().report().detection.clone().unwrap();
     let auto = detection("auto", Device::Cpu);
-    let why = "device \"cpu\"; measured against \"session\" where detection takes 5 % of a step";
+    let why = "device \"cpu\"; measured against \"session\" where detection takes 5 % of a step and 0.25 ms";
     assert_eq!((auto.detector.as_str(), auto.why.as_str()), ("bvh", why));
     let named = detection("brute", Device::Auto);
     assert_eq!((named.detector.as_str(), named.why.as_str()), ("brute", "contact.detector = \"brute\""));

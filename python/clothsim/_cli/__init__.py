@@ -9,13 +9,13 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from clothsim._cli import doctor, export, materials, plan, reproduce, run, schema, stability, study, sweep, tune
+from clothsim._cli import doctor, export, materials, plan, reproduce, run, schema, stability, study, sweep, tune, view
 from clothsim._core import __version__
 from clothsim.errors import ClothSimError, GpuUnavailable, MissingDependency, OutputError, OutputExists
 
 __all__ = ["main"]
 
-_COMMANDS = (run, plan, export, study, tune, sweep, stability, reproduce, materials, doctor, schema)
+_COMMANDS = (run, plan, view, export, study, tune, sweep, stability, reproduce, materials, doctor, schema)
 
 # Exit codes: what was asked for cannot be done / what was asked for is wrong.
 _FAILED, _BAD_INPUT = 1, 2

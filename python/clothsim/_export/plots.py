@@ -21,20 +21,32 @@ _ENERGIES = {
 _STAGES = ("#2f5d8c", "#9c2f35", "#c08a2e", "#3f7a57", "#7a5195", "#8d8a84", "#5aa0a8", "#c46f9b", "#a8a03c")
 
 
-def write(frames: list[dict[str, Any]], path: Path, title: str) -> None:
-    """Draw energy by kind over time, wall-clock time per stage and contacts per frame, into a PNG."""
+def write(frames: list[dict[str, Any]], path: Path, title: str, *, effects: list[dict[str, Any]] | None = None) -> None:
+    """Draw energy by kind over time, wall-clock time per stage, and contacts per frame, into a PNG, SVG or PDF.
+
+    With ``effects``, the table of a report, also what each effect cost in the whole run.
+    """
     figures = optional("matplotlib.figure", extra="plot", purpose="drawing plots")
     optional("matplotlib.backends.backend_agg", extra="plot", purpose="drawing plots")
     times = np.array([frame["time"] for frame in frames])
     has_contact = any(frame["contact"] for frame in frames)
-    figure = figures.Figure(figsize=(10, 10.5 if has_contact else 7.5), dpi=150, layout="constrained")
-    axes = figure.subplots(3 if has_contact else 2, 1, sharex=True)
+    costs = sorted((e["milliseconds"], e["name"]) for e in effects or [] if e["milliseconds"])
+    over_time = 3 if has_contact else 2
+    heights = [3.5] * over_time + [0.9 + 0.26 * len(costs)] * bool(costs)
+    figure = figures.Figure(figsize=(10, sum(heights)), dpi=150, layout="constrained")
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    axes = [figure.add_subplot(grid[0])]
+    axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(1, over_time)]
     figure.suptitle(title or "clothsim", fontsize=15, color=_INK, x=0.01, ha="left")
     _energies(axes[0], times, frames)
     _timings(axes[1], times, frames)
     if has_contact:
         _contacts(axes[2], times, frames)
+    for axis in axes[:-1]:
+        axis.tick_params(labelbottom=False)
     axes[-1].set_xlabel("simulated time [s]", color=_INK)
+    if costs:
+        _costs(figure.add_subplot(grid[over_time]), costs)
     for axis in axes:
         axis.grid(color=_GRID, linewidth=0.8)
         axis.set_axisbelow(True)
@@ -43,7 +55,10 @@ def write(frames: list[dict[str, Any]], path: Path, title: str) -> None:
         axis.margins(x=0.01)
         axis.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", facecolor="white")
+    kind = path.suffix.lower().lstrip(".") or "png"
+    undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)  # equal runs give equal files
+    with optional("matplotlib", extra="plot", purpose="drawing plots").rc_context({"svg.hashsalt": "clothsim"}):
+        figure.savefig(buffer, format=kind, facecolor="white", metadata=undated)
     write_whole(path, buffer.getvalue())
 
 
@@ -57,6 +72,21 @@ def _energies(axis: Any, times: Any, frames: list[dict[str, Any]]) -> None:
         label = f"{kind} (change)" if kind in ("gravity", "total") else kind
         axis.plot(times, values, color=colour, linewidth=2.2 if kind == "total" else 1.5, label=label)
     axis.set_ylabel("energy [J]", color=_INK)
+
+
+def _costs(axis: Any, costs: list[tuple[float, str]]) -> None:
+    """Bars of what each effect cost in the whole run [s]."""
+    seconds = [1e-3 * milliseconds for milliseconds, _ in costs]
+    total = sum(seconds)
+    axis.barh([name for _, name in costs], seconds, color="#2f5d8c", height=0.66)
+    for row, value in enumerate(seconds):
+        axis.text(value, row, f"  {value:.3g} s, {value / total:.0%}", va="center", fontsize=8.5, color=_INK)
+    axis.set_xlim(0.0, 1.18 * max(seconds))
+    axis.set_xlabel("wall-clock time of each effect in the whole run [s]", color=_INK)
+    axis.spines[["top", "right"]].set_visible(False)
+    axis.grid(axis="x", color=_GRID, linewidth=0.8)
+    axis.set_axisbelow(True)
+    axis.tick_params(colors=_INK, labelsize=9)
 
 
 def _timings(axis: Any, times: Any, frames: list[dict[str, Any]]) -> None:

@@ -37,6 +37,7 @@ OUTPUTS = (
     "vtk",
     "film_strip.png",
     "plots.png",
+    "view.html",
     "report.json",
     "last_good.checkpoint",
 )

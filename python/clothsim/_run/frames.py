@@ -14,7 +14,7 @@ from clothsim._arrays import Floats
 from clothsim._files import output_error
 from clothsim.errors import CheckpointError
 
-__all__ = ["FrameWriter"]
+__all__ = ["FrameWriter", "frames_so_far"]
 
 
 class FrameWriter:
@@ -93,6 +93,30 @@ class FrameWriter:
         if self.frames == 0 or self._count == 0:
             return np.zeros((self.frames, self._count, 3))
         return np.memmap(self._rows_path, dtype="<f8", mode="r", shape=(self.frames, self._count, 3))
+
+
+def frames_so_far(folder: Path, vertex_count: int) -> tuple[Floats, list[dict[str, Any]]]:
+    """Frames (frames, n, 3) and facts of a run on its way, up to the first that is not whole; nothing is changed.
+
+    Raises
+    ------
+    CheckpointError
+        The files cannot be read.
+    """
+    try:
+        lines = (folder / "frames.jsonl").read_bytes().split(b"\n")[:-1]
+        rows = np.fromfile(folder / "frames.bin", dtype="<f8")
+    except OSError as error:
+        raise CheckpointError(f"{folder}: cannot read its frames: {error.strerror}") from error
+    width = 3 * vertex_count
+    count = len(rows) // width if width else 0
+    frames = rows[: count * width].reshape(count, vertex_count, 3)
+    facts = []
+    for line, row in zip(lines, frames, strict=False):
+        if not _belongs(line, row.tobytes()):
+            break
+        facts.append(json.loads(line.partition(b" ")[2]))
+    return frames[: len(facts)], facts
 
 
 def _open(path: Path) -> IO[bytes]:

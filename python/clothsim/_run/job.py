@@ -21,6 +21,7 @@ from clothsim._run.folder import RunFolder, digest, read_checkpoint
 from clothsim._run.frames import FrameWriter
 from clothsim._run.outputs import Outputs, check_packages
 from clothsim._run.start import Start
+from clothsim._scene_facts import contact_thickness
 from clothsim.errors import (
     CheckpointError,
     ClothSimError,
@@ -211,7 +212,7 @@ class Job:
                 print(f"warning: {warning}", file=sys.stderr)
         fps = float(settings["fps"])
         lengths = self._lengths()
-        bodies = simulation.bodies
+        bodies = simulation.bodies if self.start is None else self.start.undeformed(simulation.bodies)
         standing = standing_positions(bodies, simulation.collider_positions)
         every = round(float(settings["checkpoint_interval"]) * fps)
         moving = sum(b.vertex_count for b in bodies if not b.static)
@@ -231,6 +232,7 @@ class Job:
             recording = Recording(
                 bodies, times, rows[:, :moving], standing,
                 velocities=rows[:, moving:] if with_velocities else None, fps=fps, up=scene["up"], name=scene["name"],
+                thickness=contact_thickness(scene),
             )  # fmt: skip
             outputs = Outputs(
                 self.out, settings, recording, lines, simulation, facts.wall_seconds(), error, fingerprint

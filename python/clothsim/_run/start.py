@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from clothsim._arrays import Floats
 from clothsim.errors import InvalidInput
-from clothsim.recording import Recording
+from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
 
 __all__ = ["Start"]
@@ -30,12 +30,15 @@ class Start:
         Of all cloth vertices of the scene, in its order [m], [m/s].
     estimated : bool
         The recording has no velocities: these are differences of positions.
+    rests : dict of str to (m, 3, 2) float64 or None
+        Undeformed shape of each cloth in that recording [m], where it is known.
     """
 
     time: float
     positions: Floats
     velocities: Floats
     estimated: bool
+    rests: dict[str, Floats | None] = field(default_factory=dict)
 
     @classmethod
     def of(cls, recording: Recording, scene: Scene, frame: int = -1) -> Start:
@@ -80,8 +83,12 @@ class Start:
             )
         return cls(
             float(recording.times[at]), np.concatenate(positions), np.concatenate(velocities),
-            not recording.has_velocities,
+            not recording.has_velocities, {name: recording.rest(name) for name in names},
         )  # fmt: skip
+
+    def undeformed(self, bodies: list[Body]) -> list[Body]:
+        """Give cloths that begin deformed, in this frame, the undeformed shape that the recording knew."""
+        return [replace(b, rest=self.rests.get(b.name)) if b.rest == "start" else b for b in bodies]
 
     def digest(self) -> str:
         """Fingerprint of the state."""

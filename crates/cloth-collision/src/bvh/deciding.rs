@@ -3,9 +3,22 @@
 use super::narrow::Narrow;
 use super::places::{Pairing, Places};
 use super::traverse::{LeafPairs, Visit};
+use crate::ccd::batch::Batch;
+use std::cell::RefCell;
 
 /// Candidates wait until there are so many.
 const FLUSH: usize = 2048;
+
+/// What only the work needs: the next task of the same thread goes on with it, still in the cache.
+#[derive(Debug, Default)]
+struct Scratch {
+    places: Places,
+    batch: Batch,
+}
+
+thread_local! {
+    static SPARE: RefCell<Option<Scratch>> = const { RefCell::new(None) };
+}
 
 /// The contacts of one task.
 pub(super) struct Deciding<'a> {
@@ -16,8 +29,10 @@ pub(super) struct Deciding<'a> {
 
 impl<'a> Deciding<'a> {
     /// `narrow` is of a scene by rank.
-    pub(super) fn new(narrow: Narrow<'a>) -> Self {
-        Self { pairing: Pairing::fastest(), places: Places::default(), narrow }
+    pub(super) fn new(mut narrow: Narrow<'a>) -> Self {
+        let Scratch { places, batch } = SPARE.take().unwrap_or_default();
+        narrow.reuse(batch);
+        Self { pairing: Pairing::fastest(), places, narrow }
     }
 }
 
@@ -31,8 +46,7 @@ impl<const ENDS: usize> Visit<ENDS> for Deciding<'_> {
 
     fn finish(&mut self, leaves: &LeafPairs<'_, ENDS>) {
         self.narrow.take_places(leaves.tree, &mut self.places);
-        // What only the work needed goes to the next task, still in the cache.
-        self.places = Places::default();
-        self.narrow.release();
+        let scratch = Scratch { places: std::mem::take(&mut self.places), batch: self.narrow.release() };
+        SPARE.set(Some(scratch));
     }
 }

@@ -140,9 +140,15 @@ impl Narrow<'_> {
         (self.waiting, self.vertices) = (waiting, vertices);
     }
 
-    /// Gives back the memory of what waits; nothing does.
-    pub(crate) fn release(&mut self) {
-        (self.waiting, self.vertices, self.batch) = (vec![], vec![], Batch::default());
+    /// Works in the memory of that batch.
+    pub(crate) fn reuse(&mut self, batch: Batch) {
+        self.batch = batch;
+    }
+
+    /// Gives back the memory of what waits; nothing does. The batch may be used again.
+    pub(crate) fn release(&mut self) -> Batch {
+        (self.waiting, self.vertices) = (vec![], vec![]);
+        std::mem::take(&mut self.batch)
     }
 
     /// Takes pairs of places out and decides them. The scene is one by rank, of this tree.

@@ -1,6 +1,6 @@
 //! New boxes for the present positions: per vertex, per feature block, per block of the tree.
 
-use super::build::Tree;
+use super::build::{Leaf, Tree};
 use crate::CollisionMesh;
 use crate::bounds::{Block, LANES, MovingBox};
 use cloth_mesh::NONE;
@@ -51,35 +51,36 @@ impl<const ENDS: usize> Boxes<ENDS> {
         active: Option<&[bool]>,
         pool: &rayon::ThreadPool,
     ) {
-        let leaf_count = tree.leaves.len();
+        self.refit_blocks(tree, mesh, of_vertex, active, pool);
+        let Self { vertices, vertex_blocks, edge_blocks, .. } = self;
         pool.install(|| {
-            resize(&mut self.vertices, mesh.vertex_count, MovingBox::EMPTY);
-            resize(&mut self.blocks, tree.block_count(), Block::EMPTY);
-            resize(&mut self.hulls, tree.block_count(), MovingBox::EMPTY);
-            resize(&mut self.lanes, tree.block_count(), BlockLanes::default());
-            resize(&mut self.vertex_blocks, tree.vertex_ids.len(), Block::EMPTY);
-            resize(&mut self.edge_blocks, tree.edge_ids.len(), Block::EMPTY);
+            refill(edge_blocks, &tree.edge_ends, |ends| fitted(ends, vertices));
+            refill(vertex_blocks, one_corner(&tree.vertex_ids), |corner| fitted(corner, vertices));
         });
+    }
 
-        let Self { vertices, blocks, hulls, vertex_blocks, edge_blocks, .. } = self;
+    /// [`Boxes::refit`] without the boxes of features: those of triangles and of what lies above them.
+    pub(crate) fn refit_blocks(
+        &mut self,
+        tree: &Tree,
+        mesh: &CollisionMesh,
+        of_vertex: impl Fn(usize) -> MovingBox<ENDS> + Sync,
+        active: Option<&[bool]>,
+        pool: &rayon::ThreadPool,
+    ) {
+        let Self { vertices, blocks, hulls, lanes, .. } = self;
         pool.install(|| {
-            vertices.par_chunks_mut(VERTEX_CHUNK).enumerate().for_each(|(chunk, boxes)| {
-                for (k, b) in boxes.iter_mut().enumerate() {
-                    *b = of_vertex(chunk * VERTEX_CHUNK + k);
-                }
-            });
-            let vertices = &*vertices;
-            fill(&mut blocks[..leaf_count], &tree.corners, vertices);
-            fill(edge_blocks, &tree.edge_ends, vertices);
-            fill(vertex_blocks, one_corner(&tree.vertex_ids), vertices);
-            hulls[..leaf_count].par_chunks_mut(BLOCK_CHUNK).zip(blocks.par_chunks(BLOCK_CHUNK)).for_each(
-                |(hulls, blocks)| {
-                    for (hull, block) in hulls.iter_mut().zip(blocks) {
-                        *hull = block.hull();
-                    }
-                },
-            );
+            vertices.clear();
+            let all = (0..mesh.vertex_count).into_par_iter().with_min_len(VERTEX_CHUNK);
+            vertices.par_extend(all.map(&of_vertex));
+            blocks.reserve(tree.block_count().saturating_sub(blocks.len()));
+            refill(blocks, &tree.corners, |corners| fitted(corners, vertices));
+            hulls.reserve(tree.block_count().saturating_sub(hulls.len()));
+            refill(hulls, blocks, Block::hull);
         });
+        blocks.resize(tree.block_count(), Block::EMPTY);
+        hulls.resize(tree.block_count(), MovingBox::EMPTY);
+        lanes.resize(tree.block_count(), BlockLanes::default());
         for (k, leaf) in tree.leaves.iter().enumerate() {
             let used = first_lanes(leaf.count);
             let is_active = |mask: &[bool], t: u32| {
@@ -91,6 +92,39 @@ impl<const ENDS: usize> Boxes<ENDS> {
         for k in 0..tree.inner.len() {
             self.refit_inner(tree, k);
         }
+    }
+
+    /// Fits the boxes of the features of the leaves that `wanted` marks.
+    pub(crate) fn refit_features(&mut self, tree: &Tree, wanted: &[bool], pool: &rayon::ThreadPool) {
+        let Self { vertices, vertex_blocks, edge_blocks, .. } = self;
+        vertex_blocks.resize(tree.vertex_ids.len(), Block::EMPTY);
+        edge_blocks.resize(tree.edge_ids.len(), Block::EMPTY);
+        // The features of a chunk of leaves lie together.
+        let (mut of_vertices, mut of_edges) = (&mut vertex_blocks[..], &mut edge_blocks[..]);
+        let mut chunks = Vec::with_capacity(tree.leaves.len() / BLOCK_CHUNK + 1);
+        for (leaves, wanted) in tree.leaves.chunks(BLOCK_CHUNK).zip(wanted.chunks(BLOCK_CHUNK)) {
+            let (first, last) = (leaves[0], leaves[leaves.len() - 1]);
+            let count = |of: fn(&Leaf) -> [u32; 2]| (of(&last)[1] - of(&first)[0]) as usize;
+            let (vertex_chunk, other_vertices) = of_vertices.split_at_mut(count(|leaf| leaf.vertex_blocks));
+            let (edge_chunk, other_edges) = of_edges.split_at_mut(count(|leaf| leaf.edge_blocks));
+            (of_vertices, of_edges) = (other_vertices, other_edges);
+            chunks.push((leaves, wanted, vertex_chunk, edge_chunk));
+        }
+        pool.install(|| {
+            chunks.into_par_iter().with_max_len(1).for_each(|(leaves, wanted, vertex_chunk, edge_chunk)| {
+                let [first_vertex, first_edge] = [leaves[0].vertex_blocks[0], leaves[0].edge_blocks[0]];
+                for (leaf, _) in leaves.iter().zip(wanted).filter(|(_, wanted)| **wanted) {
+                    for k in leaf.vertex_blocks[0]..leaf.vertex_blocks[1] {
+                        let corners = std::array::from_ref(&tree.vertex_ids[k as usize]);
+                        fill_one(&mut vertex_chunk[(k - first_vertex) as usize], corners, vertices);
+                    }
+                    for k in leaf.edge_blocks[0]..leaf.edge_blocks[1] {
+                        let ends = &tree.edge_ends[k as usize];
+                        fill_one(&mut edge_chunk[(k - first_edge) as usize], ends, vertices);
+                    }
+                }
+            });
+        });
     }
 
     /// Fits block `k` of those above the leaves to the blocks below it.
@@ -125,12 +159,10 @@ impl<const ENDS: usize> Boxes<ENDS> {
     }
 }
 
-/// Makes room on all threads of the pool: pages that are touched for the first time cost more than what is written there.
-fn resize<T: Copy + Send + Sync>(list: &mut Vec<T>, len: usize, value: T) {
-    if list.len() != len {
-        list.clear();
-        list.par_extend(rayon::iter::repeat_n(value, len));
-    }
+/// Writes a list anew on all threads of the pool: pages that are touched for the first time cost more than what is written there.
+fn refill<T: Sync, U: Send>(list: &mut Vec<U>, of: &[T], value: impl Fn(&T) -> U + Sync + Send) {
+    list.clear();
+    list.par_extend(of.par_iter().with_min_len(BLOCK_CHUNK).map(value));
 }
 
 fn first_lanes(count: u32) -> u32 {
@@ -146,16 +178,15 @@ fn one_corner(ids: &[[u32; LANES]]) -> &[[[u32; LANES]; 1]] {
     ids.as_chunks::<1>().0
 }
 
-fn fill<const ENDS: usize, const N: usize>(
-    blocks: &mut [Block<ENDS>],
-    corners: &[[[u32; LANES]; N]],
+/// The boxes of a block's features.
+#[inline]
+fn fitted<const ENDS: usize, const N: usize>(
+    corners: &[[u32; LANES]; N],
     vertices: &[MovingBox<ENDS>],
-) {
-    blocks.par_chunks_mut(BLOCK_CHUNK).zip(corners.par_chunks(BLOCK_CHUNK)).for_each(|(blocks, corners)| {
-        for (block, corners) in blocks.iter_mut().zip(corners) {
-            fill_one(block, corners, vertices);
-        }
-    });
+) -> Block<ENDS> {
+    let mut block = Block::EMPTY;
+    fill_one(&mut block, corners, vertices);
+    block
 }
 
 /// Fits a block to the boxes of its features' vertices, `[corner][lane]`.

@@ -1,14 +1,18 @@
-//! Decides many pairs: the filters, then the march of those that they leave.
+//! Decides many pairs: two filters in single precision, then the march of those that they leave, whose first round asks the
+//! filter in double precision.
 
 use super::coarse;
 use super::edge_edge::EdgeEdgeMotion;
-use super::filter;
+use super::filter::{self, Points};
 use super::instructions::{Instructions, Kernel};
 use super::lanes::{Doubles, MAX_DOUBLES, MAX_SINGLES, Mask, Singles, SmallRow, Vector};
 use super::march::{NEVER, march, points};
 use super::motions::Motions;
 use super::vertex_triangle::VertexTriangleMotion;
 use crate::StencilKind;
+
+/// Share of the pairs that the second filter leaves from which on it is of little use.
+const MOST_LEFT: f64 = 0.75;
 
 /// The pairs to decide, by number.
 pub(crate) trait Pairs {
@@ -73,23 +77,28 @@ impl<P: Pairs + ?Sized> Kernel for Decide<'_, P> {
     fn run<D: Doubles, S: Singles>(self) -> usize {
         let Self { kind, motions, pairs, batch } = self;
         batch.coarse_filter::<S, P>(kind, motions, pairs);
-        batch.fine_filter::<D>(kind, motions);
+        let left = batch.numbers.len();
+        batch.second_filter::<S>(kind, motions);
+        // Where single precision tells few pairs apart, those that double precision does leave before the march.
+        let is_blunt = batch.numbers.len() as f64 > MOST_LEFT * left as f64;
+        if is_blunt {
+            batch.fine_filter::<D>(kind, motions);
+        }
         let Batch { vertices, times, waiting, .. } = batch;
-        let left = vertices.len();
         waiting.clear();
-        waiting.extend(0..left as u32);
+        waiting.extend(0..vertices.len() as u32);
         times.clear();
-        times.resize(left, NEVER);
+        times.resize(vertices.len(), NEVER);
         let rows = |place: u32| motions.rows(&vertices[place as usize]);
+        let thickness = motions.thickness;
         match kind {
             StencilKind::VertexTriangle => {
-                march::<D, VertexTriangleMotion<D>, 3>(rows, motions.thickness, waiting, times);
+                march::<D, VertexTriangleMotion<D>, 3>(rows, thickness, !is_blunt, waiting, times)
             }
             StencilKind::EdgeEdge => {
-                march::<D, EdgeEdgeMotion<D>, 4>(rows, motions.thickness, waiting, times);
+                march::<D, EdgeEdgeMotion<D>, 4>(rows, thickness, !is_blunt, waiting, times)
             }
         }
-        left
     }
 }
 
@@ -103,7 +112,6 @@ impl Batch {
         motions: &Motions,
         pairs: &P,
     ) {
-        static ORIGIN: SmallRow = [0.0; 8];
         let Self { numbers, vertices, .. } = self;
         let count = pairs.count();
         numbers.clear();
@@ -120,10 +128,7 @@ impl Batch {
                 group[lane] = pairs.vertices(first + lane.min(lanes - 1));
                 rows[lane] = motions.small_rows(&group[lane]);
             }
-            let mut points = [Vector([S::splat(0.0); 3]); 8];
-            for k in 0..4 {
-                [points[k], points[k + 4]] = S::gather(&rows, k);
-            }
+            let points = small_points::<S>(&rows);
             let apart = coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT).bits();
             for lane in 0..lanes {
                 (numbers[kept], vertices[kept]) = ((first + lane) as u32, group[lane]);
@@ -158,4 +163,39 @@ impl Batch {
         numbers.truncate(kept);
         vertices.truncate(kept);
     }
+
+    /// Keeps the pairs that more directions do not show to be apart.
+    #[inline(always)]
+    fn second_filter<S: Singles>(&mut self, kind: StencilKind, motions: &Motions) {
+        let Self { numbers, vertices, .. } = self;
+        let (mut kept, mut first) = (0, 0);
+        while first < vertices.len() {
+            let lanes = S::COUNT.min(vertices.len() - first);
+            let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
+            for lane in 0..S::COUNT {
+                rows[lane] = motions.small_rows(&vertices[first + lane.min(lanes - 1)]);
+            }
+            let points = small_points(&rows);
+            let apart =
+                coarse::apart_by_more::<S>(kind, &points, motions.small_thickness, coarse::UNIT).bits();
+            for lane in 0..lanes {
+                (numbers[kept], vertices[kept]) = (numbers[first + lane], vertices[first + lane]);
+                kept += (!apart >> lane & 1) as usize;
+            }
+            first += lanes;
+        }
+        numbers.truncate(kept);
+        vertices.truncate(kept);
+    }
+}
+
+static ORIGIN: SmallRow = [0.0; 8];
+
+#[inline(always)]
+fn small_points<S: Singles>(rows: &[[&SmallRow; 4]; MAX_SINGLES]) -> Points<S> {
+    let mut points = [Vector([S::splat(0.0); 3]); 8];
+    for k in 0..4 {
+        [points[k], points[k + 4]] = S::gather(rows, k);
+    }
+    points
 }

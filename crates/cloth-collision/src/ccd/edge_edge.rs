@@ -6,6 +6,7 @@ use super::lanes::{Lanes, Vector};
 use super::march::{Directions, Motion};
 use super::separation::Relative;
 use super::{INSIDE_MARGIN, TOUCHING};
+use crate::StencilKind;
 use crate::distance::edge_edge::parameters;
 
 /// The ends of edge a relative to those of edge b (a0−b0, a0−b1, a1−b0, a1−b1), and both edges' vectors.
@@ -29,6 +30,8 @@ fn differences<L: Lanes>(p: &Points<L>, k: usize) -> [Vector<L>; 4] {
 }
 
 impl<L: Lanes> Motion<L, 4> for EdgeEdgeMotion<L> {
+    const KIND: StencilKind = StencilKind::EdgeEdge;
+
     #[inline(always)]
     fn new(p: &Points<L>, thickness: f64) -> Self {
         Self {

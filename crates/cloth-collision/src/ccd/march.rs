@@ -5,9 +5,10 @@
 //! as there are lanes; the pairs that a question has settled leave before the next one, so that the lanes stay full.
 
 use super::cubic::Cubic;
-use super::filter::Points;
+use super::filter::{self, Points};
 use super::lanes::{Doubles, Lanes, MAX_DOUBLES, Mask, Row, Rows, Vector};
 use super::separation::Relative;
+use crate::StencilKind;
 
 /// Progress, as a fraction of the step, below which the march has arrived at a contact. The returned time is earlier
 /// than the true one by about this much at a transversal contact.
@@ -20,6 +21,7 @@ pub(crate) const NEVER: f64 = f64::INFINITY;
 
 /// What a stencil gives to the march.
 pub(crate) trait Motion<L: Lanes, const K: usize> {
+    const KIND: StencilKind;
     /// The motion of the points, four at t0 and the same at t1.
     fn new(p: &Points<L>, thickness: f64) -> Self;
     fn relative(&self) -> &Relative<L, K>;
@@ -114,20 +116,21 @@ fn direction<L: Doubles, M: Motion<L, K>, const K: usize>(mut motion: M, t: L) -
     Answer { goes_on: moves & !is_apart, time }
 }
 
-/// Marches all `pairs` (their numbers; the list is used up) from t = 0 and leaves their times in `times`, by number.
-/// All points are finite.
+/// Marches all `pairs` (their numbers; the list is used up) from t = 0 and leaves their times in `times`, by number. With
+/// `filters`, those that [`filter`] shows to be apart are not marched; returns how many the others are. All points are finite.
 #[inline(always)]
 pub(crate) fn march<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
     rows: impl Fn(u32) -> Rows<'a>,
     thickness: f64,
+    filters: bool,
     pairs: &mut [u32],
     times: &mut [f64],
-) {
+) -> usize {
     for &pair in &*pairs {
         times[pair as usize] = 0.0;
     }
     let mut count = pairs.len();
-    let mut is_first = true;
+    let (mut is_first, mut marched) = (true, 0);
     // A loop over the questions, so that each is compiled once.
     for step in 0..2 * MAX_ROUNDS {
         if count == 0 {
@@ -137,22 +140,41 @@ pub(crate) fn march<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
         if matches!(question, Question::Root) && thickness > 0.0 {
             continue;
         }
-        count = ask::<L, M, K>(question, is_first, &rows, thickness, &mut pairs[..count], times);
+        let first = if is_first { Some(First { filters }) } else { None };
+        let asked = ask::<L, M, K>(question, first, &rows, thickness, &mut pairs[..count], times);
+        count = asked.left;
+        if is_first {
+            marched = asked.marched;
+        }
         is_first = false;
     }
+    marched
 }
 
-/// Asks all pairs, the first time also what needs no time, notes their times, and brings those that go on to the front: how many they are.
+/// What the first round asks beside its question.
+#[derive(Debug, Clone, Copy)]
+struct First {
+    filters: bool,
+}
+
+/// How many pairs a round marched, and how many of them go on.
+struct Asked {
+    marched: usize,
+    left: usize,
+}
+
+/// Asks all pairs, notes their times, and brings those that go on to the front. The first time it asks also the
+/// filter and what needs no time.
 #[inline(always)]
 fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
     question: Question,
-    is_first: bool,
+    first_round: Option<First>,
     rows: &impl Fn(u32) -> Rows<'a>,
     thickness: f64,
     pairs: &mut [u32],
     times: &mut [f64],
-) -> usize {
-    let mut kept = 0;
+) -> Asked {
+    let (mut kept, mut marched) = (0, 0);
     let mut first = 0;
     while first < pairs.len() {
         let count = L::COUNT.min(pairs.len() - first);
@@ -162,7 +184,20 @@ fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
             t[lane] = times[pairs[first + lane] as usize];
         }
         let (motion, t) = (M::new(&points, thickness), L::from_array(&t));
-        let before = if is_first { Some(start(&motion, t)) } else { None };
+        let before = if let Some(First { filters }) = first_round {
+            let Answer { mut goes_on, mut time } = start(&motion, t);
+            let mut left = (1 << count) - 1;
+            if filters {
+                let apart = filter::apart::<L>(M::KIND, &points, thickness);
+                left &= (!apart).bits();
+                time = L::select(apart, L::splat(NEVER), time);
+                goes_on = goes_on & !apart;
+            }
+            marched += left.count_ones() as usize;
+            Some(Answer { goes_on, time })
+        } else {
+            None
+        };
         let Answer { mut goes_on, mut time } = match question {
             Question::Root => root(motion, t),
             Question::Direction => direction(motion, t),
@@ -180,7 +215,7 @@ fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
         }
         first += count;
     }
-    kept
+    Asked { marched, left: kept }
 }
 
 /// The points of a group of at least one pair and at most as many as there are lanes; further lanes repeat the last one.

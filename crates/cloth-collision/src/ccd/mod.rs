@@ -71,10 +71,10 @@ fn one(kind: StencilKind, p: &[Vec3; 8], thickness: f64) -> Option<f64> {
     let (mut pairs, mut times) = ([0], [NEVER]);
     match kind {
         StencilKind::VertexTriangle => {
-            march::<f64, VertexTriangleMotion<f64>, 3>(rows, thickness, &mut pairs, &mut times);
+            march::<f64, VertexTriangleMotion<f64>, 3>(rows, thickness, false, &mut pairs, &mut times);
         }
         StencilKind::EdgeEdge => {
-            march::<f64, EdgeEdgeMotion<f64>, 4>(rows, thickness, &mut pairs, &mut times);
+            march::<f64, EdgeEdgeMotion<f64>, 4>(rows, thickness, false, &mut pairs, &mut times);
         }
     }
     (times[0] != NEVER).then_some(times[0])

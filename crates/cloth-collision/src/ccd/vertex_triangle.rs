@@ -6,12 +6,15 @@ use super::lanes::{Lanes, Vector};
 use super::march::{Directions, Motion};
 use super::separation::Relative;
 use super::{INSIDE_MARGIN, TOUCHING};
+use crate::StencilKind;
 use crate::distance::vertex_triangle::weights;
 
 /// The triangle's corners relative to the vertex.
 pub(crate) struct VertexTriangleMotion<L>(Relative<L, 3>);
 
 impl<L: Lanes> Motion<L, 3> for VertexTriangleMotion<L> {
+    const KIND: StencilKind = StencilKind::VertexTriangle;
+
     #[inline(always)]
     fn new(p: &Points<L>, thickness: f64) -> Self {
         Self(Relative::new(

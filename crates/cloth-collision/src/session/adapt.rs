@@ -10,8 +10,11 @@ const MEASURE: [u32; 2] = [64, 256];
 const DOUBTFUL: f64 = 0.75;
 /// Frames for which the answer holds.
 const SURE: u32 = 16;
-/// n_f moves on by its quarter, at least by one.
+/// n_f moves on by its quarter, at least by one; until it first turns round, by its half where the cost has just fallen to less
+/// than this share.
 const STEP: u32 = 4;
+const LONG_STEP: u32 = 2;
+const FALLS: f64 = 0.95;
 /// n_f of the first session times the square root of the mean step in mean edge lengths, by measurement. Per frame, a session
 /// costs its first frame over n_f and tests of the pairs in reach of the balls, which grow with n_f steps: the sum is least near
 /// an n_f that is inverse to the root of the step.
@@ -38,6 +41,8 @@ pub(super) struct Adaptation {
     /// No motion has been seen.
     is_fresh: bool,
     is_growing: bool,
+    /// How often n_f has turned round.
+    turns: u32,
     previous: Option<f64>,
     /// Cost of a frame alone.
     alone: Option<f64>,
@@ -59,6 +64,7 @@ impl Adaptation {
             frames,
             is_fresh: matches!(rule, Frames::Adaptive { .. }),
             is_growing: true,
+            turns: 0,
             previous: None,
             alone: None,
             since_alone: 0,
@@ -133,7 +139,7 @@ impl Adaptation {
             let lasted = self.count;
             self.session_ends();
             self.frames = self.frames.min(lasted);
-            self.is_growing = false;
+            (self.is_growing, self.turns) = (false, self.turns.saturating_add(1));
         }
         is_worse
     }
@@ -152,8 +158,9 @@ impl Adaptation {
         let average = self.cost / f64::from(self.count);
         self.count = 0;
         if self.previous.is_some_and(|previous| average > WORSE * previous) {
-            self.is_growing = !self.is_growing;
+            (self.is_growing, self.turns) = (!self.is_growing, self.turns.saturating_add(1));
         }
+        let falls = self.turns == 0 && self.previous.is_some_and(|previous| average < FALLS * previous);
         self.previous = Some(average);
         let is_sure = self.alone.is_some() && self.since_alone < SURE.max(2 * self.frames);
         let pays = self.alone.is_none_or(|alone| average < alone);
@@ -162,7 +169,7 @@ impl Adaptation {
             return;
         }
         self.is_in_doubt = !is_sure && (!pays || average > DOUBTFUL * self.first);
-        let step = (self.frames / STEP).max(1);
+        let step = (self.frames / if falls { LONG_STEP } else { STEP }).max(1);
         self.frames = if self.is_growing {
             (self.frames + step).min(most)
         } else {
@@ -179,7 +186,7 @@ impl Adaptation {
             self.paused = self.pause;
             self.pause = (2 * self.pause).min(PAUSE[1]);
             self.previous = None;
-            self.is_growing = true;
+            (self.is_growing, self.turns) = (true, 0);
             self.frames = 2.min(most);
         }
     }
@@ -220,7 +227,7 @@ mod tests {
     #[test]
     fn sessions_grow_while_they_get_cheaper() {
         let seen = sessions(RULE, |_| 10.0, 1.0, 8.0, 2 * MEASURE[1]);
-        assert_eq!(seen[..7], [4, 5, 6, 7, 8, 10, 12]);
+        assert_eq!(seen[..6], [4, 5, 7, 10, 15, 20]);
         assert_eq!(*seen.iter().max().unwrap(), 20);
         assert!(seen[1..].contains(&1), "measured again: {seen:?}");
     }

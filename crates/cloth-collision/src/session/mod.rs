@@ -22,6 +22,7 @@ pub(crate) mod distance;
 mod every_frame;
 pub(crate) mod flat;
 mod frame;
+mod meeting;
 mod options;
 mod pairs;
 mod reach;
@@ -37,6 +38,7 @@ use crate::{Body, Bvh, CollisionMesh, Contacts, DetectError, Detector, Query, Ve
 use adapt::{Adaptation, Plan};
 use contour::Contours;
 use dangling::Upwards;
+use meeting::Featured;
 use pairs::Pairs;
 use reach::Reach;
 use room::{Room, Weights};
@@ -64,6 +66,7 @@ pub struct SkippingSession {
     /// Which vertices have pairs, or had some in this session.
     has_pairs: Vec<bool>,
     boxes: Boxes<1>,
+    featured: Featured,
     upwards: Option<Upwards>,
     contours: Option<Contours>,
     samples: Samples,
@@ -103,6 +106,7 @@ impl SkippingSession {
             pairs: Pairs::default(),
             has_pairs: vec![],
             boxes: Boxes::default(),
+            featured: Featured::all(),
             upwards: None,
             contours: None,
             samples: Samples::new(mesh),

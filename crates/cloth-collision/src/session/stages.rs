@@ -2,13 +2,13 @@
 
 use super::contour::{self, Contours};
 use super::dangling::{Upwards, ball_box, one_by_one, one_by_one_tests};
+use super::meeting::{Featured, is_by_need};
 use super::pairs::{Admissible, Found, FrontEnd, Pairs, Register};
 use super::room::{FARTHEST, Room, Weights};
 use super::work::Work;
 use super::{Running, SkippingSession, flat};
-use crate::bvh::leaf_pair;
 use crate::bvh::narrow::{self, Narrow, Scene, merge};
-use crate::bvh::traverse::{Candidates, Sink, Streaming, TraverseCounts, traverse};
+use crate::bvh::traverse::{Streaming, TraverseCounts};
 use crate::{CollisionMesh, Contacts, Query, Vec3};
 use std::time::Instant;
 
@@ -33,7 +33,13 @@ impl SkippingSession {
         }
         let tree = &self.bvh.tree;
         let of_vertex = |v: usize| ball_box(&room.middles[v], room.radii[v], room.thickness);
-        self.boxes.refit(tree, mesh, of_vertex, None, pool);
+        self.featured = if is_by_need(tree, mesh) {
+            self.boxes.refit_blocks(tree, mesh, of_vertex, None, pool);
+            Featured::none(tree)
+        } else {
+            self.boxes.refit(tree, mesh, of_vertex, None, pool);
+            Featured::all()
+        };
         work.updated(mesh.vertex_count, tree.block_count());
         if self.options.low_curvature && tree.roots.iter().any(|root| mesh.bodies_meet(root.body, root.body))
         {
@@ -49,7 +55,7 @@ impl SkippingSession {
         let updated = Instant::now();
         let register =
             || Streaming::new(Register::new(mesh, &room.middles, &room.radii, None, room.thickness));
-        let (visits, counts) = traverse(tree, &self.boxes, mesh, pool, register);
+        let (visits, counts) = self.featured.meet(tree, &mut self.boxes, mesh, register, pool);
         self.pairs.clear();
         self.has_pairs.clear();
         self.has_pairs.resize(mesh.vertex_count, false);
@@ -102,16 +108,12 @@ impl SkippingSession {
         let all = expected(self.tests_per_leaf[1]).unwrap_or(tree.block_count() as u64);
         self.stats.one_by_one = one < all;
         let (visits, counts) = if self.stats.one_by_one {
-            let (mut candidates, mut sink, mut counts) =
-                (Candidates::default(), register().sink, TraverseCounts::default());
-            counts.box_tests = one_by_one(tree, &self.boxes, mesh, &leaves, |a, b| {
-                counts.leaf_pairs += 1;
-                leaf_pair::features(tree, &self.boxes, a, b, &mut candidates);
-                sink.take(&mut candidates);
-            });
-            (vec![Streaming::new(sink)], counts)
+            let mut pairs = vec![];
+            let box_tests = one_by_one(tree, &self.boxes, mesh, &leaves, |a, b| pairs.push([a, b]));
+            let counts = TraverseCounts { box_tests, leaf_pairs: pairs.len() as u64 };
+            (vec![self.featured.meet_pairs(tree, &mut self.boxes, &pairs, register(), pool)], counts)
         } else {
-            traverse(tree, &self.boxes, mesh, pool, register)
+            self.featured.meet(tree, &mut self.boxes, mesh, register, pool)
         };
         let which = usize::from(!self.stats.one_by_one);
         self.tests_per_leaf[which] = Some(counts.box_tests as f64 / leaves.len().max(1) as f64);

@@ -180,7 +180,10 @@ impl Auto {
         if others.is_empty() {
             String::new()
         } else {
-            format!("; measured against {} where detection takes 5 % of a step", others.join(", "))
+            format!(
+                "; measured against {} where detection takes 5 % of a step and 0.25 ms",
+                others.join(", ")
+            )
         }
     }
 }

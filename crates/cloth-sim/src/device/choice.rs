@@ -1,8 +1,8 @@
 //! `contact.detector = "auto"`: when which method is measured, and what follows. Seconds come in, decisions
 //! go out; no clock, no detector.
 //!
-//! - **Watch.** The method at work is watched. If detection takes less than [`WORTH`] of the step there is
-//!   nothing to gain: the next look is after twice as many steps.
+//! - **Watch.** The method at work is watched. If detection takes less than [`WORTH`] of the step, or less than [`LEAST`],
+//!   there is nothing to gain: the next look is after twice as many steps.
 //! - **Probe.** Else all methods do [`BLOCK`] steps each, in turn, [`ROUNDS`] times over, so that a trend of
 //!   the scene meets all of them. A method's cost is the lesser of its means. Its turn ends as soon as it has
 //!   taken what the cheapest mean takes for a whole turn: it cannot win any more. A probe therefore costs at
@@ -15,6 +15,8 @@
 const FIRST: usize = 8;
 /// Least part of the step that detection takes for a probe.
 const WORTH: f64 = 0.05;
+/// Time of detection in a step \[s\] below which a probe, which builds what it measures, does not pay.
+const LEAST: f64 = 0.25e-3;
 /// Steps of a method's turn.
 const BLOCK: usize = 8;
 /// Turns of each method.
@@ -49,7 +51,7 @@ impl Tally {
     }
 
     fn is_worth_it(&self) -> bool {
-        self.detection >= WORTH * self.all
+        self.detection >= WORTH * self.all && self.mean() >= LEAST
     }
 }
 
@@ -261,6 +263,16 @@ mod tests {
         let mut choice = Choice::new(2, 0);
         let (used, chosen) = run(&mut choice, 5000, 100.0, |place, _| [1.0, 0.1][place]);
         assert!(chosen.is_empty() && used.iter().all(|place| *place == 0));
+    }
+
+    #[test]
+    fn detection_that_takes_no_time_is_left_alone() {
+        let chosen = |seconds: f64| {
+            let mut choice = Choice::new(2, 0);
+            run(&mut choice, 500, 0.0, |place, _| seconds * [1.0, 0.1][place]).1
+        };
+        assert!(chosen(0.9 * LEAST).is_empty());
+        assert!(!chosen(1.1 * LEAST).is_empty(), "the other method is cheaper");
     }
 
     /// Neither noise below the margin nor a spike in one turn changes the choice.
