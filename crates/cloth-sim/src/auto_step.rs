@@ -88,6 +88,8 @@ struct Doubled {
     state: State,
     /// Of pins and air, where it is asked for.
     work: Option<Work>,
+    /// Σ m times the way of repulsion's pushes [kg m].
+    pushed: Vec3,
     /// Estimated error of the two halves [m].
     error: f64,
     /// Sides of near pairs at the start, for an attempt that is refused; those of the middle stand.
@@ -116,7 +118,7 @@ impl Simulation {
             control.size = control.size.clamp(time.dt_min, time.dt_max);
             let (dt, t1) = cut(start, end, control.size);
             let failure = match self.doubled(t1, dt, order, &mut report) {
-                Ok(Doubled { mut state, work, error, sides, seconds }) => {
+                Ok(Doubled { mut state, work, pushed, error, sides, seconds }) => {
                     let ratio = error / (SHARE * time.dt_tolerance);
                     let last = report.rejected == MAX_REJECTED || dt <= time.dt_min;
                     if ratio > 1.0 && !last {
@@ -126,14 +128,20 @@ impl Simulation {
                         continue;
                     }
                     let floor = report.retries >= time.max_halvings || 0.5 * dt < time.dt_min;
-                    match self.audit(&state, work, dt, floor, &mut report) {
+                    match self.audit(&state, work, pushed, floor, &mut report) {
                         Ok(ledger) => state.pace.ledger = ledger,
                         Err(failure) => {
                             self.remember_sides(sides);
                             self.refuse(dt, &failure);
                             report.retries += 1;
                             control.size = 0.5 * dt;
-                            continue;
+                            if !floor {
+                                continue;
+                            }
+                            (report.dt, report.smallest_dt, report.substeps) = (dt, dt, 2);
+                            self.stand_still(t1);
+                            self.state.pace.control = control;
+                            return self.finish_step(report, started.elapsed().as_secs_f64());
                         }
                     }
                     let refused = report.rejected + report.retries > 0;
@@ -190,7 +198,9 @@ impl Simulation {
         second.note(report);
         let [a, b, c] = [&whole, &first, &second].map(Trial::seconds);
         let work = Trial::work_of([&first, &second]);
-        Ok(Doubled { state: end, work, error, sides, seconds: [0, 1].map(|k| a[k] + b[k] + c[k]) })
+        let pushed = first.pushed() + second.pushed();
+        let seconds = [0, 1].map(|k| a[k] + b[k] + c[k]);
+        Ok(Doubled { state: end, work, pushed, error, sides, seconds })
     }
 
     /// From the middle of a step, where the state is: the second half, the step's end, and its estimated error [m].

@@ -5,21 +5,23 @@
 //! that the cloth has had since contact began, plus what has been done to it since: the work of pins and of air
 //! ([`cloth_core::Work`]; what they take away is not counted), and the most that moving colliders and pins can have done through
 //! contact. A step that exceeds it by more than half of the energy that has been in the motion fails like any other, and is tried with
-//! half the size. After [`MAX_HALVINGS`] halvings it is accepted, and the report says how much was made.
+//! half the size. At the floor, `time.max_halvings` halvings, it is accepted, and the report says how much was made. But where that is
+//! more than all the energy that has been in the motion and nothing drives it, the cloth stays where it is and loses its velocity: a
+//! board of a millimetre that hits something with one corner would else be bent by more than it weighs, in every step.
 //!
 //! Nothing is looked at in scenes without contact, in steps in which nothing touches, and under explicit integrators. With
 //! `effects.energy_account` energy and work are reported of all steps, whatever touches, and under any integrator.
 
+use crate::constraints::Holds;
 use crate::step::{Failure, State, Trial, touches};
 use crate::{EnergyReport, Simulation, StepReport, Vec3};
 use cloth_core::{Motion, Work};
 
-/// Halvings of a step for its energy: the energy that a contact makes falls with the square of the step or faster.
-pub(crate) const MAX_HALVINGS: u32 = 4;
 /// Part of the energy that has been in the motion which a step may make: what ordinary steps of contact make stays below.
 const ALLOWED: f64 = 0.5;
-/// Repulsion moves overlapping surfaces apart by this part of the thickness in a step.
-const REPULSION: f64 = 0.1;
+
+/// What repulsion may do in a step, as a multiple of what it does against gravity: layers that part are pushed unevenly.
+const PUSHED: f64 = 4.0;
 
 /// Energies that a step is judged by: a part of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -46,6 +48,15 @@ impl Simulation {
         wind || self.pins.vertices.iter().any(moves)
     }
 
+    /// Ends a step at `t1` \[s\] where it started, all cloth at rest.
+    pub(crate) fn stand_still(&mut self, t1: f64) {
+        let state = &mut self.state;
+        state.time = t1;
+        state.v.fill(Vec3::zeros());
+        state.contact_force.fill(Vec3::zeros());
+        state.holds = Holds::default();
+    }
+
     /// Work of pins and air on the cloth over the step from the state as it is to `end`; none where no account is kept.
     pub(crate) fn work_to(&self, end: &State, dt: f64) -> Option<Work> {
         if !(self.scene.effects.energy_account || self.judges(end)) {
@@ -58,14 +69,15 @@ impl Simulation {
         })
     }
 
-    /// The ledger after the step to `end` in which `work` was done, part of a step of `whole` [s].
+    /// The ledger after the step to `end`, in which `work` was done and repulsion pushed by `pushed` \[kg m\]
+    /// ([`cloth_response::ResponseInfo::pushed`]).
     ///
-    /// With `accept` a step that made energy passes, and the ledger starts anew from there.
+    /// With `accept` a step that made energy passes, and the ledger starts anew from there; but for one that made too much.
     pub(crate) fn audit(
         &self,
         end: &State,
         work: Option<Work>,
-        whole: f64,
+        pushed: Vec3,
         accept: bool,
         report: &mut StepReport,
     ) -> Result<Ledger, Failure> {
@@ -89,15 +101,21 @@ impl Simulation {
             let (level, scale) = sums(&self.state.x, &self.state.v);
             Ledger { open: true, level, scale }
         };
-        let level = ledger.level + work.pins.max(0.0) + work.air.max(0.0) + self.most_through_contact(end);
-        let made = energy - level;
-        if made > ALLOWED * ledger.scale + self.opening(whole) {
-            if !accept {
+        // What starts nearer than its thickness is moved apart, against gravity where it has to be, and bent on the way.
+        let gravity = Vec3::from(self.scene.gravity());
+        let lifted = PUSHED * (-gravity.dot(&pushed)).max(0.0);
+        let through_contact = self.most_through_contact(end);
+        let level = ledger.level + work.pins.max(0.0) + work.air.max(0.0) + through_contact + lifted;
+        let (made, opening) = (energy - level, self.opening());
+        if made > ALLOWED * ledger.scale + opening {
+            let runs_away = made > ledger.scale + opening && through_contact == 0.0 && !self.is_driven(end);
+            if !accept || runs_away {
                 return Err(Failure::Energy { made, level });
             }
             report.energy_made += made;
             note(report, entry);
-            return Ok(Ledger { open: true, level: energy, scale: ledger.scale.max(moving) });
+            // What was made is none of the motion's.
+            return Ok(Ledger { open: true, level: energy, scale: ledger.scale });
         }
         note(report, entry);
         let scale = if made <= 0.0 { ledger.scale.max(moving) } else { ledger.scale };
@@ -117,12 +135,11 @@ impl Simulation {
         if way > 0.0 { way * pushes.map(Vec3::norm).sum::<f64>() } else { 0.0 }
     }
 
-    /// What opening overlapping surfaces gently may make in a step of `whole` [s]: height, and speed [J].
-    fn opening(&self, whole: f64) -> f64 {
+    /// What opening surfaces that overlap by their thickness may lift the cloth [J].
+    fn opening(&self) -> f64 {
         let mass: f64 = self.masses().iter().sum();
         let thickness = self.scene.contact.as_ref().map_or(0.0, |c| c.thickness);
-        let gravity = Vec3::from(self.scene.gravity()).norm();
-        mass * (gravity * thickness + 0.5 * (REPULSION * thickness / whole).powi(2))
+        mass * Vec3::from(self.scene.gravity()).norm() * thickness
     }
 }
 

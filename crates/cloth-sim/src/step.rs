@@ -86,6 +86,11 @@ pub(crate) enum Failure {
         pairs: Vec<[u32; 4]>,
         vertices: Vec<u32>,
     },
+    /// Strain limits that contact, pins or zones left no room for: these edges, and the largest excess of their length.
+    Strained {
+        edges: Vec<[u32; 2]>,
+        excess: f64,
+    },
     /// Contact made so much energy beyond what there may be [J].
     Energy {
         made: f64,
@@ -115,6 +120,11 @@ impl Trial {
     /// Seconds of continuous detection, and of all.
     pub(crate) fn seconds(&self) -> [f64; 2] {
         [self.contact.as_ref().map_or(0.0, |(info, _)| seconds_of_detection(info)), self.seconds]
+    }
+
+    /// Σ m times the way of repulsion's pushes [kg m].
+    pub(crate) fn pushed(&self) -> Vec3 {
+        self.contact.as_ref().map_or_else(Vec3::zeros, |(info, _)| info.pushed)
     }
 
     /// Adds the counts of its dynamics to the step's.
@@ -147,6 +157,13 @@ impl std::fmt::Display for Failure {
         match self {
             Self::Alarm(alarm) => write!(f, "diverged: {}", alarm.reason),
             Self::Unresolved { pairs, .. } => write!(f, "stuck: {} pairs still collide", pairs.len()),
+            Self::Strained { edges, excess } => {
+                let count = edges.len();
+                write!(
+                    f,
+                    "{count} edges stay beyond their strain limit, by up to {excess:.1e} of their length"
+                )
+            }
             Self::Energy { made, level } => {
                 write!(f, "contact made {made:.3e} J of mechanical energy beyond {level:.3e} J")
             }
@@ -158,18 +175,26 @@ impl std::fmt::Display for Failure {
 }
 
 impl Simulation {
-    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace. Part of a step of `whole` \[s\];
-    /// at `least` \[s\] energy that contact makes is accepted and reported.
+    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace. At the `floor` of step sizes
+    /// energy that contact makes is accepted and reported; where it is more than there was in the motion, the cloth stops instead.
     pub(crate) fn attempt(
         &mut self,
         t1: f64,
         dt: f64,
-        [whole, least]: [f64; 2],
+        floor: bool,
         report: &mut StepReport,
     ) -> Result<(), Failure> {
         let mut trial = self.trial(t1, dt, report)?;
-        let floor = dt <= least || 0.5 * dt < self.scene.time.dt_min;
-        trial.state.pace.ledger = self.audit(&trial.state, trial.work, whole, floor, report)?;
+        let floor = floor || 0.5 * dt < self.scene.time.dt_min;
+        trial.state.pace.ledger = match self.audit(&trial.state, trial.work, trial.pushed(), floor, report) {
+            Err(failure @ Failure::Energy { .. }) if floor => {
+                self.refuse(dt, &failure);
+                trial.note_work(report);
+                self.stand_still(t1);
+                return Ok(());
+            }
+            judged => judged?,
+        };
         trial.note(report);
         let seconds = trial.seconds();
         self.commit(trial.state, seconds);

@@ -154,7 +154,7 @@ impl ElementBuffers {
                 parts.each(kind, f, n, first, |range, f, ((memory, elastic), work), couplings| {
                     model.linearise(range, x, v, linear, memory, Survey { elastic, work }, f, couplings);
                 });
-                memory.take(room);
+                memory.take(&room);
                 if !survey.work.is_empty() {
                     let (memory, survey) = (&*memory, &*survey);
                     parts.each(kind, f, n, chunks(count), |range, f, (), couplings| {

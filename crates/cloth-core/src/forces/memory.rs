@@ -108,7 +108,7 @@ impl Memory {
     }
 
     /// Puts the elements found among those that remember.
-    pub(crate) fn take(&mut self, room: Vec<Found>) {
+    pub(crate) fn take(&mut self, room: &[Found]) {
         let Self::Sparse(Sparse { words, elements, numbers }) = self else { return };
         if room.iter().all(|found| found.elements.is_empty()) {
             return;
@@ -199,7 +199,7 @@ mod tests {
         let mut memory = Memory::sparse(2);
         for round in rounds {
             assert_eq!(memory.room(COUNT).len(), 3);
-            memory.take(round.map(found).into());
+            memory.take(&round.map(found));
         }
         memory
     }

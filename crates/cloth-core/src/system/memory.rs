@@ -162,5 +162,5 @@ pub(crate) fn accept(model: &dyn ForceModel, memory: &mut Memory, x: &[Vec3]) {
         let start = chunk * ELEMENTS_PER_CHUNK;
         model.accept(start..(start + ELEMENTS_PER_CHUNK).min(count), x, memory);
     });
-    memory.take(room);
+    memory.take(&room);
 }

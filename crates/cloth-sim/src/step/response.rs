@@ -115,6 +115,7 @@ fn response_failure(error: ResponseError, asleep: &[bool]) -> Failure {
             Failure::Wake(vertices.into_iter().filter(sleeps).collect())
         }
         ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
+        ResponseError::Strained { edges, excess } => Failure::Strained { edges, excess },
         ResponseError::NotFinite { name, vertex } => {
             Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
         }

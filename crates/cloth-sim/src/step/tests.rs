@@ -150,7 +150,7 @@ fn a_retry_leaves_no_trace_in_contact_constraints() {
     let good = retried.state.clone();
     retried.state.v[7].x = 1e6;
     let before = retried.state.clone();
-    assert!(retried.attempt(0.02, 0.01, [0.01, 0.0], &mut crate::StepReport::default()).is_err());
+    assert!(retried.attempt(0.02, 0.01, false, &mut crate::StepReport::default()).is_err());
     assert_eq!(retried.state, before);
     retried.state = good;
     retried.fail = |time, dt| time < 0.015 && dt > 0.006;

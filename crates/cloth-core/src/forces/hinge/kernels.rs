@@ -92,7 +92,7 @@ impl<L: BendingLaw> Hinges<L> {
         v: &[Vec3],
         linear: &Linear,
         places: &mut impl PlacesMut<L>,
-        survey: Survey<&mut [f64]>,
+        Survey { elastic, work }: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         blocks: &mut [Block],
     ) {
@@ -102,8 +102,8 @@ impl<L: BendingLaw> Hinges<L> {
             let value = dihedral_angle(&self.corners_of(element, x));
             let (place, curvature) = self.arrive(rest, places, k, value, linear.accept);
             if self.coupled.is_some() {
-                survey.elastic[k] = rest.height * self.elastic(place.as_ref(), curvature);
-                survey.work[k] = curvature;
+                elastic[k] = rest.height * self.elastic(place.as_ref(), curvature);
+                work[k] = curvature;
             } else {
                 self.exact_blocks(element, x, v, linear, (place, curvature, 0.0), f, blocks);
             }

@@ -92,12 +92,11 @@ impl<L: BendingLaw> Places<L> for Growing<'_, L::Memory> {
 impl<L: BendingLaw> PlacesMut<L> for Growing<'_, L::Memory> {
     #[inline(always)]
     fn put(&mut self, k: usize, place: L::Memory) {
-        match self.few.find(k) {
-            Some(at) => self.few.places[at] = place,
-            None => {
-                self.found.elements.push((self.few.first + k) as u32);
-                self.found.numbers.extend_from_slice(bytemuck::cast_slice(&[place]));
-            }
+        if let Some(at) = self.few.find(k) {
+            self.few.places[at] = place;
+        } else {
+            self.found.elements.push((self.few.first + k) as u32);
+            self.found.numbers.extend_from_slice(bytemuck::cast_slice(&[place]));
         }
     }
 }
