@@ -15,7 +15,7 @@
 use crate::constraints::Holds;
 use crate::step::{Failure, State, Trial, touches};
 use crate::{SimError, Simulation, StepReport, Vec3};
-use cloth_core::{Method, Work};
+use cloth_core::Method;
 use cloth_response::Sides;
 use std::time::Instant;
 
@@ -86,8 +86,6 @@ fn order(method: Method) -> i32 {
 /// The end of a step taken whole and in halves.
 struct Doubled {
     state: State,
-    /// Of pins and air, where it is asked for.
-    work: Option<Work>,
     /// Σ m times the way of repulsion's pushes [kg m].
     pushed: Vec3,
     /// Estimated error of the two halves [m].
@@ -118,7 +116,7 @@ impl Simulation {
             control.size = control.size.clamp(time.dt_min, time.dt_max);
             let (dt, t1) = cut(start, end, control.size);
             let failure = match self.doubled(t1, dt, order, &mut report) {
-                Ok(Doubled { mut state, work, pushed, error, sides, seconds }) => {
+                Ok(Doubled { mut state, pushed, error, sides, seconds }) => {
                     let ratio = error / (SHARE * time.dt_tolerance);
                     let last = report.rejected == MAX_REJECTED || dt <= time.dt_min;
                     if ratio > 1.0 && !last {
@@ -128,6 +126,7 @@ impl Simulation {
                         continue;
                     }
                     let floor = report.retries >= time.max_halvings || 0.5 * dt < time.dt_min;
+                    let work = self.work_to(&state, dt);
                     match self.audit(&state, work, pushed, floor, &mut report) {
                         Ok(ledger) => state.pace.ledger = ledger,
                         Err(failure) => {
@@ -197,10 +196,9 @@ impl Simulation {
         first.note(report);
         second.note(report);
         let [a, b, c] = [&whole, &first, &second].map(Trial::seconds);
-        let work = Trial::work_of([&first, &second]);
         let pushed = first.pushed() + second.pushed();
         let seconds = [0, 1].map(|k| a[k] + b[k] + c[k]);
-        Ok(Doubled { state: end, work, pushed, error, sides, seconds })
+        Ok(Doubled { state: end, pushed, error, sides, seconds })
     }
 
     /// From the middle of a step, where the state is: the second half, the step's end, and its estimated error [m].

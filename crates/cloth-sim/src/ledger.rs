@@ -13,7 +13,7 @@
 //! `effects.energy_account` energy and work are reported of all steps, whatever touches, and under any integrator.
 
 use crate::constraints::Holds;
-use crate::step::{Failure, State, Trial, touches};
+use crate::step::{Failure, State, touches};
 use crate::{EnergyReport, Simulation, StepReport, Vec3};
 use cloth_core::{Motion, Work};
 
@@ -140,15 +140,6 @@ impl Simulation {
         let mass: f64 = self.masses().iter().sum();
         let thickness = self.scene.contact.as_ref().map_or(0.0, |c| c.thickness);
         mass * Vec3::from(self.scene.gravity()).norm() * thickness
-    }
-}
-
-impl Trial {
-    /// Work of pins and air over two motions in a row; none where that of one is not known.
-    pub(crate) fn work_of(trials: [&Self; 2]) -> Option<Work> {
-        let mut sum = trials[0].work?;
-        sum += trials[1].work?;
-        Some(sum)
     }
 }
 
