@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[1]
 MODEL = ROOT / "crates" / "cloth-sim" / "src" / "cost_model.json"
 README = ROOT / "README.md"
 BEGIN, END = "<!-- effect prices: begin -->", "<!-- effect prices: end -->"
-COMMAND = "python benches/effect_prices.py --steps 12 --write"
+COMMAND = "python benches/effect_prices.py --write"
 WARM_UP = 5
 """Steps before the clock starts."""
 
@@ -115,6 +115,7 @@ class Case:
 
 
 AUTO = {"self_collision": "auto", "ccd": "auto"}
+LEAN = {"history": "auto"}
 CASES = [
     Case("moving colliders", draped, "drape"),
     Case("pins", hanging, "hanging"),
@@ -126,6 +127,7 @@ CASES = [
     Case("nonlinear", lambda: hanging("nonlinear"), "hanging"),
     Case("plastic", lambda: hanging("plastic"), "hanging"),
     Case("hysteresis", lambda: hanging("hysteresis"), "hanging"),
+    Case("elastic hinges", lambda: hanging("hysteresis", effects=LEAN), "hanging", lambda: hanging("hysteresis")),
     Case("stitches", sewn, "hanging"),
     Case("wind", hanging, "hanging"),
     Case("gravity", hanging, "hanging"),
@@ -133,6 +135,7 @@ CASES = [
     Case("integrator", hanging, "hanging"),
     Case("linear solver", hanging, "hanging"),
     Case("guard", hanging, "hanging"),
+    Case("energy account", lambda: hanging(effects={"energy_account": True}), "hanging", hanging),
     Case("adaptive step", draped, "drape", lambda: draped(time={"dt": 0.005, "max_halvings": 0})),
     Case("error-controlled step", lambda: hanging(time={"dt": "auto"}), "hanging", hanging),
     Case("contact", draped, "drape"),

@@ -121,6 +121,8 @@ def test_bad_input_on_the_command_line(tmp_path: Path, run_cli: RunCli) -> None:
     unknown = run_cli("study", scene, "--vary", "integrater=rk4,midpoint", "-o", out, "--json")
     assert unknown.returncode == 2
     assert 'did you mean "integrator"?' in json.loads(unknown.stdout)["error"]["message"]
+    alone = run_cli("study", scene, "--vary", "integrator=rk5", "-o", out)
+    assert alone.returncode == 2 and 'got "rk5" (did you mean "rk4"?)' in alone.stderr, "named before all else"
     both = run_cli("tune", scene, "--error", "1mm", "--budget", "1ms", "-o", out)
     assert both.returncode == 2 and "not allowed with" in both.stderr
     physical = run_cli("tune", scene, "--error", "1mm", "--vary", "friction=0.1,0.2", "-o", out)
@@ -128,6 +130,13 @@ def test_bad_input_on_the_command_line(tmp_path: Path, run_cli: RunCli) -> None:
     run = run_cli("tune", scene, "--error", "1mm", "--vary", "precision=f64,f32", "-o", out)
     assert run.returncode == 2 and "got precision, which is no part of one" in run.stderr
     assert not out.exists(), "bad input leaves no folder behind"
+    out.mkdir()
+    (out / "stability.json").write_text("{}")
+    other = run_cli("study", scene, "--vary", "dt=0.01,0.005", "-o", out, "--overwrite")
+    assert other.returncode == 2 and "holds an atlas; choose another folder" in other.stderr
+    (out / "stability.json").rename(out / "study.json")
+    other = run_cli("stability", "stretch", "--quick", "-o", out, "--overwrite")
+    assert other.returncode == 2 and "holds a study; choose another folder" in other.stderr
     assert "example: clothsim study" in run_cli("study", "--help").stdout.replace("\n", " ")
 
 

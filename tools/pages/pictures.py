@@ -448,6 +448,57 @@ def slow_friction() -> bytes:
     return finish(figure)
 
 
+@picture
+def elastic_hinges() -> bytes:
+    figure, axis = plot()
+    b1, b2, c1 = 2.0, 1.0, -0.5
+    k0 = 0.5 * (b1 - b2) / -c1
+    m0 = 0.5 * (b1 - b2) * k0
+    chance = np.random.default_rng(1)
+    shares = np.linspace(0.02, 0.5, 13)
+    worst = []
+    for share in shares:
+        most = 0.0
+        for _ in range(60):
+            middle, reach = share * k0 * chance.uniform(-1, 1), share * k0 * chance.uniform(0, 1)
+            path = np.clip(middle + reach * chance.uniform(-1, 1, 300), -share * k0, share * k0)
+            moment = cs.bending.trace(path, model="hysteresis", b1=b1, b2=b2, c1=c1).moment
+            most = max(most, np.abs(moment - (b1 * path + c1 * path * np.abs(path))).max())
+        worst.append(100 * most / m0)
+    axis.plot(100 * shares, 100 * 2 * shares / (2 + shares), color=GREY, linewidth=1, label="the bound")
+    axis.plot(100 * shares, worst, "o", color=RED, label="worst of 60 random paths")
+    axis.set(title="what a path does to the moment", xlabel="largest curvature [% of $K_0$]", ylabel="[% of $M_0$]")
+    axis.set(xlim=0, ylim=0)
+    return finish(figure)
+
+
+@picture
+def energy_account() -> bytes:
+    keys = [{"time": 0.0}, {"time": 0.5, "position": [0, 0.5, 0]}]
+    sheet = {"name": "flag", "mesh": grid(0.4, 15), "material": "cotton", "rotation": {"axis": [1, 0, 0], "angle": 1.2}}
+    scene = {
+        "duration": 2.0,
+        "time": {"dt": 0.002},
+        "air": {"wind": [0.0, 0.0, 4.0], "density": 1.2, "drag": 1.0, "lift": 0.5},
+        "effects": {"energy_account": True},
+        "cloth": [{**sheet, "pins": [{"vertices": [0, 14], "keyframes": keys}]}],
+    }
+    sim = cs.Simulation(cs.Scene(**scene), device="cpu")
+    start = sim.energy["total"]
+    sim.advance(1.0)
+    steps = sim.report["steps"]
+    time = [step["time"] for step in steps]
+    pins, air = (np.cumsum([step["energy"][kind] for step in steps]) for kind in ("pins", "air"))
+    total = np.array([step["energy"]["total"] for step in steps]) - start
+    figure, axis = plot()
+    axis.plot(time, pins, color=BLUE, label="work of pins")
+    axis.plot(time, air, color=GREEN, label="work of air")
+    axis.plot(time, total, color=RED, label="energy gained")
+    axis.plot(time, pins + air - total, color=GREY, linewidth=1, label="dissipated")
+    axis.set(title="a flag is lifted by 0.5 m in wind", xlabel="time [s]", ylabel="[J]")
+    return finish(figure)
+
+
 def main(names: list[str]) -> None:
     """Draw the pictures of these names, or all."""
     FOLDER.mkdir(parents=True, exist_ok=True)

@@ -30,8 +30,10 @@ pub use energy::Energy;
 pub use environment::Environment;
 pub use error::{CoreError, StepError};
 pub use forces::{Psd, stitch::Stitch};
-pub use integrator::{ActiveSet, Constraint, Integrator, IntegratorParams, Method, Pins, StepInfo};
+pub use integrator::{
+    ActiveSet, Constraint, Integrator, IntegratorParams, Method, Motion, Pins, StepInfo, Work,
+};
 pub use material::{Bending, HingeCoupling, InPlane, Material};
 pub use part::ClothPart;
 pub use solver::{SolveError, SolveInfo, SolverMethod, SolverParams};
-pub use system::ClothSystem;
+pub use system::{ClothSystem, History};

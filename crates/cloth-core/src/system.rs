@@ -1,23 +1,24 @@
 //! All force models of all cloth of a scene.
 
-use std::borrow::Cow;
+mod memory;
 
 use rayon::prelude::*;
 
 use crate::{
     ClothPart, CoreError, EffectInfo, Energy, Environment,
-    assembly::{
-        Corners, ELEMENTS_PER_CHUNK, ElementBuffers, ForceClock, ROWS_PER_CHUNK, part, parts_mut, surveyed,
-        timed,
-    },
-    bending::HingeState,
+    assembly::{Corners, ELEMENTS_PER_CHUNK, ElementBuffers, ForceClock, ROWS_PER_CHUNK, surveyed, timed},
     forces::{
         ForceModel, Linear, Survey,
         air::Air,
+        memory::{Memory, Past},
         stitch::{Stitch, Stitches},
     },
     mesh::Vec3,
 };
+
+pub use memory::History;
+#[cfg(test)]
+pub(crate) use memory::accept;
 
 /// The force models of all parts over one global vertex array.
 pub struct ClothSystem {
@@ -27,7 +28,7 @@ pub struct ClothSystem {
     air_damping: f64,
     models: Vec<Box<dyn ForceModel>>,
     /// What the elements of each model remember.
-    memory: Vec<Vec<f64>>,
+    memory: Vec<Memory>,
     /// Whether a motion has been accepted that memory has not moved on to yet.
     moved: bool,
     /// First entry of `corner_refs` of each vertex.
@@ -121,7 +122,7 @@ impl ClothSystem {
         }
         if !stitches.is_empty() {
             self.models.push(Box::new(Stitches::new(stitches)));
-            self.memory.push(Vec::new());
+            self.memory.push(Memory::default());
             (self.corner_offsets, self.corner_refs) = corners_by_vertex(&self.models, self.masses.len());
         }
         Ok(())
@@ -167,96 +168,8 @@ impl ClothSystem {
     }
 
     /// All models with their memory: those stepped together, then those apart.
-    fn all_models(&self) -> impl Iterator<Item = (&dyn ForceModel, &[f64])> {
-        self.groups().flat_map(|g| g.models.iter().zip(&g.memory).map(|(m, memory)| (&**m, &memory[..])))
-    }
-
-    /// Whether any law remembers the path that led to a state.
-    pub fn remembers(&self) -> bool {
-        self.all_models().any(|(_, memory)| !memory.is_empty())
-    }
-
-    /// What laws with memory remember of the path that ends at the accepted positions `x` [m]: with positions and
-    /// velocities, the whole state. Empty where no material asks for memory.
-    pub fn memory(&self, x: &[Vec3]) -> Vec<f64> {
-        self.memory_by_model(x).into_iter().flat_map(Cow::into_owned).collect()
-    }
-
-    /// The memory of each model, moved on to `x` if an accepted motion waits for it.
-    fn memory_by_model(&self, x: &[Vec3]) -> Vec<Cow<'_, [f64]>> {
-        let mut list = Vec::new();
-        for group in self.groups() {
-            for (model, memory) in group.models.iter().zip(&group.memory) {
-                let mut memory = Cow::Borrowed(&memory[..]);
-                if group.moved && !memory.is_empty() {
-                    model.accept(0..model.count(), x, memory.to_mut());
-                }
-                list.push(memory);
-            }
-        }
-        list
-    }
-
-    /// How many numbers of [`Self::memory`] belong to each part whose law remembers, in the order of the parts.
-    pub fn memory_sizes(&self) -> Vec<usize> {
-        self.all_models().map(|(_, memory)| memory.len()).filter(|n| *n > 0).collect()
-    }
-
-    /// Each hinge of a law with memory as it stands at the accepted positions `x` [m].
-    pub fn hinge_states(&self, x: &[Vec3]) -> Vec<HingeState> {
-        let memory = self.memory_by_model(x);
-        self.all_models().zip(&memory).flat_map(|((model, _), memory)| model.hinge_states(memory)).collect()
-    }
-
-    /// Puts back what [`Self::memory`] gave.
-    ///
-    /// # Errors
-    /// [`CoreError::Length`], [`CoreError::NotFinite`].
-    pub fn set_memory(&mut self, memory: &[f64]) -> Result<(), CoreError> {
-        let expected = self.all_models().map(|(_, memory)| memory.len()).sum();
-        if memory.len() != expected {
-            return Err(CoreError::Length { name: "memory", expected, got: memory.len() });
-        }
-        if let Some(index) = memory.iter().position(|m| !m.is_finite()) {
-            return Err(CoreError::NotFinite { name: "memory", index, got: memory[index] });
-        }
-        let Self { memory: own, apart, moved, .. } = self;
-        *moved = false;
-        let others = apart.iter_mut().flat_map(|apart| {
-            apart.moved = false;
-            &mut apart.memory
-        });
-        let mut rest = memory;
-        for to in own.iter_mut().chain(others) {
-            let mine;
-            (mine, rest) = rest.split_at(to.len());
-            to.copy_from_slice(mine);
-        }
-        Ok(())
-    }
-
-    /// Marks the motion to the positions of the next step's start as done. Laws with memory move on when that step first
-    /// looks at them: by [`Self::settle`], or as they are linearised.
-    pub(crate) fn accept(&mut self) {
-        self.moved = true;
-        if let Some(apart) = &mut self.apart {
-            apart.moved = true;
-        }
-    }
-
-    /// Lets laws with memory move on to `x` if an accepted motion waits for it. Call on the pool.
-    pub(crate) fn settle(&mut self, x: &[Vec3]) {
-        if std::mem::take(&mut self.moved) {
-            for (model, memory) in self.models.iter().zip(&mut self.memory).filter(|(_, m)| !m.is_empty()) {
-                parts_mut(memory, model.count()).into_par_iter().enumerate().for_each(|(chunk, memory)| {
-                    let start = chunk * ELEMENTS_PER_CHUNK;
-                    model.accept(start..(start + ELEMENTS_PER_CHUNK).min(model.count()), x, memory);
-                });
-            }
-        }
-        if let Some(apart) = &mut self.apart {
-            apart.settle(x);
-        }
+    fn all_models(&self) -> impl Iterator<Item = (&dyn ForceModel, &Memory)> {
+        self.groups().flat_map(|g| g.models.iter().zip(&g.memory).map(|(m, memory)| (&**m, memory)))
     }
 
     /// Corner forces and couplings of all models at (x, v). If an accepted motion waits, it is the one to `x`, and laws with
@@ -291,9 +204,10 @@ impl ClothSystem {
             let mut survey = Survey::new(model);
             if !survey.work.is_empty() {
                 let Survey { elastic, work } = &mut survey;
-                model.survey(all.clone(), x, &memory, Survey { elastic, work });
+                model.survey(all.clone(), x, memory.part(all.len(), all.clone()), Survey { elastic, work });
             }
-            model.add_energy(all.clone(), x, &memory, surveyed(&survey, all), &mut energy);
+            let memory = memory.part(all.len(), all.clone());
+            model.add_energy(all.clone(), x, memory, surveyed(&survey, all), &mut energy);
         }
         for ((m, x), v) in self.masses.iter().zip(x).zip(v) {
             energy.kinetic += 0.5 * m * v.norm_squared();
@@ -361,7 +275,7 @@ impl ClothSystem {
     }
 
     /// What the elements of each model remember.
-    pub(crate) fn settled_memory(&self) -> &[Vec<f64>] {
+    pub(crate) fn settled_memory(&self) -> &[Memory] {
         &self.memory
     }
 
@@ -416,6 +330,36 @@ impl ClothSystem {
         });
     }
 
+    /// Whether air acts on the cloth.
+    pub(crate) fn has_air(&self) -> bool {
+        self.air_damping > 0.0 || self.models.iter().any(|m| m.is_air())
+    }
+
+    /// Work of the air at (x, v) along the ways `d` of all vertices [J]: of drag and lift on triangles, and of damping. Summed by
+    /// chunks in order. Call on the pool.
+    pub(crate) fn air_work(&self, x: &[Vec3], v: &[Vec3], d: &[Vec3]) -> f64 {
+        let mut sum = 0.0;
+        for model in self.models.iter().filter(|m| m.is_air()) {
+            let (count, corners) = (model.count(), model.corners());
+            let chunk = |chunk: usize| {
+                let range = chunk * ELEMENTS_PER_CHUNK..((chunk + 1) * ELEMENTS_PER_CHUNK).min(count);
+                let mut forces = vec![Vec3::zeros(); corners * range.len()];
+                let own = &model.vertices()[corners * range.start..corners * range.end];
+                model.forces(range, x, v, Past::Dense(&[]), Survey::default(), &mut forces);
+                forces.iter().zip(own).map(|(f, &i)| f.dot(&d[i as usize])).sum::<f64>()
+            };
+            let parts: Vec<f64> =
+                (0..count.div_ceil(ELEMENTS_PER_CHUNK)).into_par_iter().map(chunk).collect();
+            sum += parts.iter().sum::<f64>();
+        }
+        if self.air_damping > 0.0 {
+            for ((m, v), d) in self.masses.iter().zip(v).zip(d) {
+                sum -= self.air_damping * m * (v - self.wind).dot(d);
+            }
+        }
+        sum
+    }
+
     /// Elastic and gravity energy, and the potential of air damping over a step: what the forces on a step's end are
     /// the gradient of where no model dissipates. Summed by chunks in order. Call on the pool, with the corners that forces at
     /// `x` were evaluated in last.
@@ -431,7 +375,7 @@ impl ClothSystem {
                         let start = chunk * ELEMENTS_PER_CHUNK;
                         let mut energy = Energy::default();
                         let range = start..(start + ELEMENTS_PER_CHUNK).min(count);
-                        let memory = part(memory, count, range.clone());
+                        let memory = memory.part(count, range.clone());
                         model.add_energy(range.clone(), x, memory, surveyed(survey, range), &mut energy);
                         energy.elastic()
                     })

@@ -4,7 +4,7 @@ use crate::ResponseError;
 use crate::friction::kernel::Kernel;
 use crate::impulse::{Contact, NormalLaw};
 use crate::motion::Motion;
-use crate::repulsion::rest_gap;
+use crate::repulsion::{push_fraction, rest_gap};
 use crate::sides::{Side, Sides};
 use crate::{ResponseParams, Resting, Vec3};
 use cloth_collision::{
@@ -17,6 +17,8 @@ use cloth_collision::{
 pub(crate) const APPROACH: f64 = 1e-3;
 /// A colliding pair ends the step at no less than this fraction of its rest gap.
 const LEAST_GAP: f64 = 0.1;
+/// Up to there it is pushed this many times as fast as an overlap is undone: at once in steps of 5 ms.
+const LEAST_PUSH: f64 = 10.0;
 
 /// One pair in contact during the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +54,7 @@ impl Hit {
     }
 
     /// The contact at the time of impact: along its normal the pair ends the step at its rest gap, or at its gap at
-    /// the start where that is less, but no nearer than a tenth of the rest gap. `None` if all vertices are prescribed.
+    /// the start where that is less, but no nearer than a tenth of the rest gap, in steps of 5 ms and more. `None` if all vertices are prescribed.
     pub(crate) fn contact<K: Kernel>(
         &self,
         mesh: &CollisionMesh,
@@ -68,8 +70,15 @@ impl Hit {
         let gap = rest_gap(&stencil, mesh, params, rest_x);
         let start: Vec3 = (0..4).map(|k| x_t0[stencil.vertices[k] as usize] * stencil.weights[k]).sum();
         let gap_t0 = stencil.normal.dot(&start);
-        let gap_t1 = gap_t0.clamp(LEAST_GAP * gap, gap);
-        let law = NormalLaw { least: (gap_t1 - gap_t0) / motion.dt, spring: 0.0, cap: f64::NEG_INFINITY };
+        let to = |gap_t1: f64| (gap_t1 - gap_t0) / motion.dt;
+        let law = if gap_t0 < LEAST_GAP * gap {
+            // Up to there it is a push, which gives no velocity.
+            let from = gap_t0.max(0.0);
+            let up = (LEAST_PUSH * push_fraction(motion.dt)).min(1.0) * (LEAST_GAP * gap - from);
+            NormalLaw { least: to(from), spring: f64::INFINITY, cap: to(from + up) }
+        } else {
+            NormalLaw { least: to(gap_t0.min(gap)), spring: 0.0, cap: f64::NEG_INFINITY }
+        };
         let friction = kernel.state(&params.friction, mesh, self.vertices[0], self.vertices[3]);
         Contact::new(&stencil, motion.inv_mass, law, friction)
     }

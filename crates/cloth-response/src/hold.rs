@@ -75,8 +75,7 @@ fn slow_down(motion: &mut Motion<'_>, hits: &[Hit]) -> Vec<u32> {
     fractions.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     fractions.dedup_by_key(|f| f.0);
     for &(v, fraction) in &fractions {
-        let (start, end) = (motion.x_t0[v as usize], motion.buffers.end[v as usize]);
-        motion.set_end(v, start + (end - start) * fraction);
+        motion.shorten(v, fraction);
     }
     fractions.into_iter().map(|f| f.0).collect()
 }

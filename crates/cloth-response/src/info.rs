@@ -1,5 +1,7 @@
 //! What the response did in one step.
 
+use crate::Vec3;
+
 /// Counts and seconds of one accepted step.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ResponseInfo {
@@ -42,6 +44,8 @@ pub struct ResponseInfo {
     /// Friction was Coulomb's with the coefficients at rest, as no contact was fast enough for more
     /// ([`crate::ResponseParams::friction_tolerance`]).
     pub slow_friction: bool,
+    /// Σ m times the way that pushes moved a vertex [kg m]: what repulsion does against gravity is −g times this.
+    pub pushed: Vec3,
     /// Edges of cloth that strain limiting pulled or pushed.
     pub limited_edges: usize,
     /// Times that the strain limits were linearised anew.

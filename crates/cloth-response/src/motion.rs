@@ -21,6 +21,8 @@ pub(crate) struct MotionBuffers {
     pub(crate) end: Vec<Vec3>,
     /// Average velocity over the step [m/s].
     pub(crate) velocity: Vec<Vec3>,
+    /// The part of it that the vertices keep: all but what pushes overlapping pairs apart; empty while that is nothing.
+    kept: Vec<Vec3>,
     /// Average velocity before any response [m/s].
     pub(crate) velocity_start: Vec<Vec3>,
     /// Tick of each vertex's last change by an impulse.
@@ -37,6 +39,7 @@ impl MotionBuffers {
         Self {
             end: Vec::with_capacity(vertices),
             velocity: Vec::with_capacity(vertices),
+            kept: Vec::new(),
             velocity_start: Vec::with_capacity(vertices),
             touched: Vec::with_capacity(vertices),
             changed: Vec::with_capacity(vertices),
@@ -45,10 +48,16 @@ impl MotionBuffers {
         }
     }
 
+    /// Average velocity without pushes [m/s]: what the step's end velocity changes by.
+    pub(crate) fn kept(&self) -> &[Vec3] {
+        if self.kept.is_empty() { &self.velocity } else { &self.kept }
+    }
+
     /// Memory [B].
     pub(crate) fn bytes(&self) -> usize {
         bytes_of(&self.end)
             + bytes_of(&self.velocity)
+            + bytes_of(&self.kept)
             + bytes_of(&self.velocity_start)
             + bytes_of(&self.touched)
             + bytes_of(&self.changed)
@@ -68,7 +77,8 @@ impl<'a> Motion<'a> {
         x_t1: &[Vec3],
         dt: f64,
     ) -> Self {
-        let MotionBuffers { end, velocity, velocity_start, touched, changed, tick, written } = buffers;
+        let MotionBuffers { end, velocity, kept, velocity_start, touched, changed, tick, written } = buffers;
+        kept.clear();
         end.clear();
         end.extend_from_slice(x_t1);
         velocity.clear();
@@ -103,16 +113,55 @@ impl<'a> Motion<'a> {
         count
     }
 
-    /// Moves one end and marks it; no change is no mark.
+    /// Moves one end and marks it, and all of that is kept; no change is no mark.
     pub(crate) fn set_end(&mut self, vertex: u32, end: Vec3) -> bool {
         let i = vertex as usize;
         if self.buffers.end[i] == end {
+            if let Some(kept) = self.buffers.kept.get_mut(i) {
+                *kept = self.buffers.velocity[i];
+            }
             return false;
         }
         self.buffers.end[i] = end;
         self.buffers.velocity[i] = (end - self.x_t0[i]) / self.dt;
+        if let Some(kept) = self.buffers.kept.get_mut(i) {
+            *kept = self.buffers.velocity[i];
+        }
         self.buffers.changed[i] = true;
         true
+    }
+
+    /// Leaves this fraction of a vertex' way, and of what is kept of it.
+    pub(crate) fn shorten(&mut self, vertex: u32, fraction: f64) {
+        let i = vertex as usize;
+        let (start, end) = (self.x_t0[i], self.buffers.end[i]);
+        let kept = self.buffers.kept()[i];
+        if self.set_end(vertex, start + (end - start) * fraction)
+            && let Some(own) = self.buffers.kept.get_mut(i)
+        {
+            *own = kept * fraction;
+        }
+    }
+
+    /// Whether there may be pushes.
+    pub(crate) fn is_parted(&self) -> bool {
+        !self.buffers.kept.is_empty()
+    }
+
+    /// From here on pushes change the motion and not what is kept of it.
+    pub(crate) fn part(&mut self) {
+        if self.buffers.kept.is_empty() {
+            self.buffers.kept.clone_from(&self.buffers.velocity);
+        }
+    }
+
+    /// Changes a vertex' velocity by an impulse: that of the motion, and what is kept of it unless the impulse is a push.
+    pub(crate) fn change(&mut self, vertex: usize, by: Vec3, tick: u32, push: bool) {
+        self.buffers.velocity[vertex] += by;
+        self.buffers.touched[vertex] = tick;
+        if !push && let Some(kept) = self.buffers.kept.get_mut(vertex) {
+            *kept += by;
+        }
     }
 
     /// Forgets the marks.

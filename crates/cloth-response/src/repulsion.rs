@@ -4,10 +4,11 @@
 //!
 //! - d < 0: the gap may shrink to g within the step and no further. Cloth lands at its rest gap.
 //! - d ≥ 0: the gap does not shrink, and the pair is pushed apart elastically by dt k_r d, at most until the gap has
-//!   grown by 0.1 d.
+//!   grown by 0.1 d, or by d dt/50 ms in steps of less than 5 ms.
 //!
 //! In velocities, with the gap linear about the candidate end of the step: v_n ≥ `least` and v_n ≤ `least` + 0.1 d/dt
-//! for the elastic part; for closest points that do not move, `least` is 0 or d/dt, as in 3.36.
+//! for the elastic part; for closest points that do not move, `least` is 0 or d/dt, as in 3.36. The elastic part moves
+//! and leaves no velocity, see [`crate::impulse`].
 //!
 //! A pair with 0 ≤ d ≤ F/k_r under the pressing force F is at rest exactly: stopping it needs more than the spring gives.
 //! Deeper pairs move out by at most a tenth of d per step, so nothing bounces and nothing leaves the band. Pairs are
@@ -34,6 +35,14 @@ const CARRIED_GAP: f64 = 0.5;
 const REST_FRACTION: f64 = 0.5;
 /// The fraction of the overlap that one step may undo (3.36).
 const PUSH_FRACTION: f64 = 0.1;
+/// Time that undoing an overlap takes at least [s]: what steps of 5 ms give. Where pushes meet what holds against them, a fraction per
+/// step would do work without bound as steps get smaller.
+const PUSH_TIME: f64 = 0.05;
+
+/// The fraction of the overlap that a step of `dt` \[s\] may undo.
+pub(crate) fn push_fraction(dt: f64) -> f64 {
+    PUSH_FRACTION.min(dt / PUSH_TIME)
+}
 
 /// The pair's rest gap [m].
 ///
@@ -71,7 +80,7 @@ fn law(gap_t0: f64, gap_t1: f64, v_n: f64, gap: f64, stiffness: f64, dt: f64) ->
     if overlap < 0.0 {
         NormalLaw { least, spring: 0.0, cap: f64::NEG_INFINITY }
     } else {
-        NormalLaw { least, spring: dt * stiffness * overlap, cap: least + PUSH_FRACTION * overlap / dt }
+        NormalLaw { least, spring: dt * stiffness * overlap, cap: least + push_fraction(dt) * overlap / dt }
     }
 }
 

@@ -127,7 +127,7 @@ impl Responder {
     /// passes of continuous detection and impulses with friction; rigid impact zones; holding back. Strain limits join the
     /// impulses; if zones or holding back broke one, the passes are run again, a few times at most. After the first
     /// detection over all pairs each further one looks at the pairs with a changed vertex (the others stand
-    /// certified). `v` changes by the change of v̄.
+    /// certified). `v` changes by the change of v̄, without what pushes overlapping pairs apart: that moves positions alone.
     ///
     /// # Errors
     /// [`ResponseError::Unresolved`] if cloth is caught between prescribed motions (retry with a smaller step), or if
@@ -225,8 +225,8 @@ impl Responder {
             let motion = &mut Motion::new(&mut self.buffers, inv_mass, x_t0, x_t1, dt);
             // What fails here may not fail with the whole law.
             if let Ok(Some(info)) = self.stages.run(&self.params, contacts, &mut detection, motion) {
-                self.write(inv_mass, x_t1, v);
-                return Ok(ResponseInfo { slow_friction: true, ..info });
+                let pushed = self.write(inv_mass, x_t1, v, dt);
+                return Ok(ResponseInfo { slow_friction: true, pushed, ..info });
             }
         }
         let motion = &mut Motion::new(&mut self.buffers, inv_mass, x_t0, x_t1, dt);
@@ -240,20 +240,29 @@ impl Responder {
                 self.stages.run(&self.params, contacts, &mut detection, motion)?
             }
         };
-        self.write(inv_mass, x_t1, v);
+        let pushed = self.write(inv_mass, x_t1, v, dt);
         // Only a tentative kernel is given up.
-        Ok(info.unwrap_or_default())
+        Ok(ResponseInfo { pushed, ..info.unwrap_or_default() })
     }
 
-    /// Writes the motion of what is not prescribed.
-    fn write(&self, inv_mass: &[f64], x_t1: &mut [Vec3], v: &mut [Vec3]) {
+    /// Writes the motion of what is not prescribed; Σ m times the way of pushes [kg m].
+    fn write(&self, inv_mass: &[f64], x_t1: &mut [Vec3], v: &mut [Vec3], dt: f64) -> Vec3 {
+        let mut pushed = Vec3::zeros();
         for i in 0..x_t1.len() {
-            let change = self.buffers.velocity[i] - self.buffers.velocity_start[i];
+            let buffers = &self.buffers;
+            if inv_mass[i] > 0.0 && buffers.velocity[i] != buffers.velocity_start[i] {
+                x_t1[i] = buffers.end[i];
+            }
+            let change = buffers.kept()[i] - buffers.velocity_start[i];
             if inv_mass[i] > 0.0 && change != Vec3::zeros() {
-                x_t1[i] = self.buffers.end[i];
                 v[i] += change;
             }
+            let push = buffers.velocity[i] - buffers.kept()[i];
+            if inv_mass[i] > 0.0 && push != Vec3::zeros() {
+                pushed += push * (dt / inv_mass[i]);
+            }
         }
+        pushed
     }
 }
 

@@ -20,6 +20,9 @@ use std::time::Instant;
 
 /// Cap on the times that strain limits are made anew within one pass.
 const MAX_STRAIN_PASSES: usize = 40;
+/// After so many of these the largest excess has to be less than this part of what it was, or no more are made.
+const STRAIN_PASSES_APART: usize = 8;
+const WORTH_GOING_ON: f64 = 0.9;
 /// Cap on the rounds of passes, zones and holding back, where these leave a strain limit broken.
 const MAX_ROUNDS: usize = 4;
 
@@ -173,6 +176,7 @@ impl Stages {
         judge(hits);
         info.collisions = hits.len();
         clock.lap(&mut info, "detection");
+        let mut worst = f64::INFINITY;
         let mut answered: HashSet<(StencilKind, [u32; 2])> = HashSet::new();
         for round in 1.. {
             let most = info.passes + params.max_passes - 1;
@@ -227,9 +231,10 @@ impl Stages {
                 limiter.measure(contacts, motion, &mut info);
                 break;
             }
-            if round == MAX_ROUNDS {
+            if round == MAX_ROUNDS || excess > WORTH_GOING_ON * worst {
                 return Err(ResponseError::Strained { edges, excess });
             }
+            worst = excess;
             settle(contacts, limiter, motion, params, &mut info);
             info.passes += 1;
             look_again(detection, motion, APPROACH * params.thickness, hits)?;
@@ -266,11 +271,10 @@ fn settle<K: Kernel>(
     params: &ResponseParams,
     info: &mut ResponseInfo,
 ) -> usize {
-    if !limiter.is_off() {
-        limiter.linearise(contacts, motion);
-    }
     let mut moved = 0;
-    for _ in 0..MAX_STRAIN_PASSES {
+    let mut earlier = f64::INFINITY;
+    // Contacts first: where the motion goes through a collider, edges point there too.
+    for pass in 1..=MAX_STRAIN_PASSES {
         let sweeps = contacts.relax(motion, params.velocity_tolerance, params.max_sweeps);
         info.sweeps += sweeps.sweeps;
         info.residual = sweeps.residual;
@@ -279,8 +283,15 @@ fn settle<K: Kernel>(
             break;
         }
         info.strain_passes += 1;
-        if limiter.linearise(contacts, motion) {
+        let excess = limiter.linearise(contacts, motion);
+        if excess == 0.0 {
             break;
+        }
+        if pass % STRAIN_PASSES_APART == 0 {
+            if excess > WORTH_GOING_ON * earlier {
+                break;
+            }
+            earlier = excess;
         }
     }
     moved

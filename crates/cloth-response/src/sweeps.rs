@@ -100,7 +100,7 @@ impl<K: Kernel> ContactSet<K> {
 
     /// Whether the kernel stands for the laws of all contacts ([`Kernel::holds`]).
     pub(crate) fn hold(&self, motion: &Motion<'_>, tolerance: f64) -> bool {
-        let velocity = &motion.buffers.velocity;
+        let velocity = motion.buffers.kept();
         !K::TENTATIVE || self.contacts.iter().all(|c| self.kernel.holds(c, velocity, tolerance))
     }
 
@@ -111,7 +111,7 @@ impl<K: Kernel> ContactSet<K> {
         for contact in self.contacts.iter().filter(|c| c.impulse.norm_squared() > 0.0) {
             info.impulses += 1;
             if self.kernel.acts(&contact.friction) {
-                let u = contact.relative(&motion.buffers.velocity);
+                let u = contact.relative(motion.buffers.kept());
                 let v_n = contact.normal.dot(&u);
                 if u.norm_squared() - v_n * v_n > tolerance * tolerance {
                     info.sliding += 1;
@@ -126,8 +126,32 @@ impl<K: Kernel> ContactSet<K> {
     ///
     /// Ends without that when contacts were looked at `max_sweeps` times their number (or [`FREE_LOOKS`] times where
     /// that is more), or after [`CHEAP_SWEEPS`] · `max_sweeps` sweeps.
+    ///
+    /// First what is kept of the motion, with friction and without the elastic part of the normal laws; then, where these ask for
+    /// more or pushes are there already, the motion itself.
     pub(crate) fn relax(&mut self, motion: &mut Motion<'_>, tolerance: f64, max_sweeps: usize) -> SweepInfo {
+        let mut info = self.sweep(motion, tolerance, max_sweeps, false);
+        let velocity = &motion.buffers.velocity;
+        if motion.is_parted() || self.contacts.iter().any(|c| c.wants_push(velocity, tolerance)) {
+            motion.part();
+            self.look_anew();
+            let pushes = self.sweep(motion, tolerance, max_sweeps, true);
+            self.look_anew();
+            info.sweeps += pushes.sweeps;
+            info.residual = info.residual.max(pushes.residual);
+        }
+        info
+    }
+
+    /// Forgets what was looked at.
+    fn look_anew(&mut self) {
+        self.looks.iter_mut().for_each(|look| look.1 = 0);
+    }
+
+    /// The sweeps over what is kept of the motion, or with `push` over the motion itself.
+    fn sweep(&mut self, motion: &mut Motion<'_>, tolerance: f64, max_sweeps: usize, push: bool) -> SweepInfo {
         let count = self.contacts.len();
+        let reviews = K::REVIEWS && !push;
         let mut info = SweepInfo::default();
         for list in [&mut self.change, &mut self.direction] {
             list.clear();
@@ -139,19 +163,23 @@ impl<K: Kernel> ContactSet<K> {
         if count == 0 {
             return info;
         }
-        self.kernel.begin(&mut self.contacts, motion.x_t0.len());
-        if K::REVIEWS {
+        if !push {
+            self.kernel.begin(&mut self.contacts, motion.x_t0.len());
+        }
+        if reviews {
             let Self { kernel, contacts, coupled, .. } = self;
             coupled.clear();
             coupled.extend((0..count as u32).filter(|&i| !kernel.alone(&contacts[i as usize].friction)));
         }
         let mut rounds = 0;
         loop {
-            self.kernel.before_sweep(info.sweeps);
+            if !push {
+                self.kernel.before_sweep(info.sweeps);
+            }
             let mut sweep = Sweep { looks: 0, residual: 0.0, norm: 0.0 };
-            if K::REVIEWS && info.sweeps > 0 {
+            if reviews && info.sweeps > 0 {
                 let coupled = std::mem::take(&mut self.coupled);
-                let one = |i: &u32| self.relax_one(*i as usize, motion, tolerance, &mut sweep);
+                let one = |i: &u32| self.relax_one(*i as usize, motion, tolerance, push, &mut sweep);
                 if info.sweeps % 2 == 0 {
                     coupled.iter().for_each(one);
                 } else {
@@ -159,23 +187,23 @@ impl<K: Kernel> ContactSet<K> {
                 }
                 self.coupled = coupled;
             } else if info.sweeps % 2 == 0 {
-                (0..count).for_each(|i| self.relax_one(i, motion, tolerance, &mut sweep));
+                (0..count).for_each(|i| self.relax_one(i, motion, tolerance, push, &mut sweep));
             } else {
-                (0..count).rev().for_each(|i| self.relax_one(i, motion, tolerance, &mut sweep));
+                (0..count).rev().for_each(|i| self.relax_one(i, motion, tolerance, push, &mut sweep));
             }
             info.sweeps += 1;
             info.residual = sweep.residual;
             budget = budget.saturating_sub(sweep.looks);
-            let kept = if K::REVIEWS && rounds == 0 { KEPT } else { usize::MAX };
+            let kept = if reviews && rounds == 0 { KEPT } else { usize::MAX };
             let spent = budget <= all / kept || info.sweeps >= most - most / kept;
             if sweep.residual <= tolerance || spent {
                 rounds += 1;
                 let over = (spent && rounds > 1) || rounds > MAX_ROUNDS;
-                if !K::REVIEWS || over {
+                if !reviews || over {
                     break;
                 }
                 if self.review(motion, tolerance) {
-                    self.follow(None, motion, tolerance);
+                    self.follow(None, motion, tolerance, push);
                     last_norm = 0.0;
                     continue;
                 }
@@ -185,7 +213,7 @@ impl<K: Kernel> ContactSet<K> {
             }
             // A restart forgets the direction, and the change that ended it with it.
             let beta = if last_norm > 0.0 { sweep.norm / last_norm } else { 0.0 };
-            self.follow(if beta > 1.0 { None } else { Some(beta) }, motion, tolerance);
+            self.follow(if beta > 1.0 { None } else { Some(beta) }, motion, tolerance, push);
             last_norm = sweep.norm;
         }
         info
@@ -204,53 +232,65 @@ impl<K: Kernel> ContactSet<K> {
     }
 
     /// Moves the impulses by `beta` times the direction and renews it.
-    fn follow(&mut self, beta: Option<f64>, motion: &mut Motion<'_>, tolerance: f64) {
+    fn follow(&mut self, beta: Option<f64>, motion: &mut Motion<'_>, tolerance: f64, push: bool) {
+        let reviews = K::REVIEWS && !push;
         let Some(beta) = beta else {
             for (direction, change) in self.direction.iter_mut().zip(&mut self.change) {
                 (*direction, *change) = (Vec3::zeros(), Vec3::zeros());
             }
             return;
         };
-        let moving = if K::REVIEWS { self.coupled.len() } else { self.contacts.len() };
+        let moving = if reviews { self.coupled.len() } else { self.contacts.len() };
         for k in 0..moving {
-            let i = if K::REVIEWS { self.coupled[k] as usize } else { k };
+            let i = if reviews { self.coupled[k] as usize } else { k };
             let step = self.direction[i] * beta;
             self.direction[i] = step + std::mem::take(&mut self.change[i]);
             let contact = &mut self.contacts[i];
             if step.norm() > tolerance * contact.mass {
-                move_impulse(contact, step, motion);
+                move_impulse(contact, step, motion, push);
                 // Its own law is off now.
                 self.looks[i].1 = 0;
             }
         }
     }
 
-    fn relax_one(&mut self, i: usize, motion: &mut Motion<'_>, tolerance: f64, sweep: &mut Sweep) {
+    #[inline]
+    fn relax_one(
+        &mut self,
+        i: usize,
+        motion: &mut Motion<'_>,
+        tolerance: f64,
+        push: bool,
+        sweep: &mut Sweep,
+    ) {
         let (vertices, seen) = self.looks[i];
         let latest = vertices.map(|v| motion.buffers.touched[v as usize]).into_iter().max();
         if seen > 0 && latest <= Some(seen) {
             return;
         }
         let contact = &mut self.contacts[i];
-        let (change, error) = contact.correction(&self.kernel, &motion.buffers.velocity);
+        let (change, error) = if push {
+            contact.push_correction(&motion.buffers.velocity)
+        } else {
+            contact.correction(&self.kernel, motion.buffers.kept())
+        };
         sweep.looks += 1;
         sweep.residual = sweep.residual.max(error);
         if error > tolerance {
-            if !K::REVIEWS || !self.kernel.alone(&contact.friction) {
+            if push || !K::REVIEWS || !self.kernel.alone(&contact.friction) {
                 sweep.norm += error * error * contact.mass;
             }
             self.change[i] = change;
-            move_impulse(contact, change, motion);
+            move_impulse(contact, change, motion, push);
         }
         self.looks[i].1 = motion.tick();
     }
 }
 
 #[inline]
-fn move_impulse<S: Copy>(contact: &mut Contact<S>, change: Vec3, motion: &mut Motion<'_>) {
+fn move_impulse<S: Copy>(contact: &mut Contact<S>, by: Vec3, motion: &mut Motion<'_>, push: bool) {
     let tick = motion.tick();
-    let touched = &mut motion.buffers.touched;
-    contact.apply(change, &mut motion.buffers.velocity, |v| touched[v] = tick);
+    contact.apply(by, push, |v, change| motion.change(v, change, tick, push));
 }
 
 /// What one sweep met.

@@ -18,7 +18,7 @@ use cloth_collision::mesh::NONE;
 pub(crate) struct Zones {
     /// Parent of each vertex, or [`NONE`]: in no zone.
     parent: Vec<u32>,
-    /// Vertices in a zone and their average velocity when they joined [m/s].
+    /// Vertices in a zone and what they kept of their average velocity when they joined [m/s].
     members: Vec<(u32, Vec3)>,
     /// (vertex of a zone, prescribed vertex that it collides with).
     ties: Vec<(u32, u32)>,
@@ -63,7 +63,7 @@ impl Zones {
         for &v in vertices.iter().filter(|&&v| !motion.prescribed(v)) {
             if self.parent[v as usize] == NONE {
                 self.parent[v as usize] = v;
-                self.members.push((v, motion.buffers.velocity[v as usize]));
+                self.members.push((v, motion.buffers.kept()[v as usize]));
                 grew = true;
             }
             if first == NONE {

@@ -2,7 +2,8 @@
 //!
 //! `pay_as_you_go minimal STEPS N` steps the integrator of `cloth-core` alone, by hand: springs, gravity, two held corners, and nothing
 //! that knows of any effect. `pay_as_you_go SCENE.toml STEPS` steps the whole engine. Both print the bytes that live after the build
-//! and after the steps, and the height of the lowest vertex.
+//! and after the steps, and the height of the lowest vertex. `pay_as_you_go plan SCENE.toml` prints the effects that are off, and
+//! refuses one of them with elements or bytes.
 #![allow(clippy::print_stdout, reason = "a command line example")]
 
 use cloth_sim::core::mesh::{RestShape, Topology, Vec3, generators};
@@ -43,8 +44,11 @@ const DT: f64 = 0.005;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let [what, steps, rest @ ..] = &args[..] else {
-        return Err("expected: minimal STEPS N, or SCENE.toml STEPS".into());
+        return Err("expected: minimal STEPS N, SCENE.toml STEPS, or plan SCENE.toml".into());
     };
+    if what == "plan" {
+        return plan(steps);
+    }
     let steps: usize = steps.parse()?;
     if what == "minimal" {
         return minimal(steps, rest.first().ok_or("expected the vertices of a side")?.parse()?);
@@ -57,6 +61,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         sim.step()?;
     }
     report(built, sim.positions());
+    Ok(())
+}
+
+fn plan(path: &str) -> Result<(), Box<dyn std::error::Error>> {
+    let scene = Scene::parse_toml(&std::fs::read_to_string(path)?, path)?;
+    let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+    let sim = Simulation::new(&scene, Assets::default(), options)?;
+    for effect in sim.plan().effects.iter().filter(|e| !e.on) {
+        if effect.elements + effect.bytes > 0 {
+            return Err(format!("{} is off and holds {} bytes", effect.name, effect.bytes).into());
+        }
+        println!("{}", effect.name);
+    }
     Ok(())
 }
 

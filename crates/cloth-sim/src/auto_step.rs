@@ -7,7 +7,7 @@
 //! a PI controller. Laws with memory see one motion from the start of the step to its end.
 //!
 //! A step whose error stays above the tolerance although it was made smaller [`MAX_REJECTED`] times, as an impact may, is
-//! accepted and counted. A step that fails is halved down to `time.dt_min`.
+//! accepted and counted. A step that fails is halved down to `time.dt_min`; one that makes energy ([`crate::ledger`]) a few times.
 //!
 //! Source: E. Hairer, S. P. Nørsett and G. Wanner, "Solving Ordinary Differential Equations I", 1993, II.4 (step doubling,
 //! local extrapolation); K. Gustafsson, "Control-theoretic techniques for stepsize selection", 1994.
@@ -86,6 +86,8 @@ fn order(method: Method) -> i32 {
 /// The end of a step taken whole and in halves.
 struct Doubled {
     state: State,
+    /// Σ m times the way of repulsion's pushes [kg m].
+    pushed: Vec3,
     /// Estimated error of the two halves [m].
     error: f64,
     /// Sides of near pairs at the start, for an attempt that is refused; those of the middle stand.
@@ -114,24 +116,42 @@ impl Simulation {
             control.size = control.size.clamp(time.dt_min, time.dt_max);
             let (dt, t1) = cut(start, end, control.size);
             let failure = match self.doubled(t1, dt, order, &mut report) {
-                Ok(Doubled { state, error, sides, seconds }) => {
+                Ok(Doubled { mut state, pushed, error, sides, seconds }) => {
                     let ratio = error / (SHARE * time.dt_tolerance);
                     let last = report.rejected == MAX_REJECTED || dt <= time.dt_min;
-                    if ratio <= 1.0 || last {
-                        let refused = report.rejected + report.retries > 0;
-                        report.above_tolerance = ratio > 1.0;
-                        (report.dt, report.smallest_dt, report.substeps) = (dt, dt, 2);
-                        report.error = Some(error);
-                        self.commit(state, seconds);
-                        self.state.pace.control = control.accepted(dt, ratio, order, refused);
-                        #[cfg(test)]
-                        self.accepted.push([t1, dt]);
-                        return self.finish_step(report, started.elapsed().as_secs_f64());
+                    if ratio > 1.0 && !last {
+                        self.remember_sides(sides);
+                        report.rejected += 1;
+                        control = control.rejected(dt, ratio, order);
+                        continue;
                     }
-                    self.remember_sides(sides);
-                    report.rejected += 1;
-                    control = control.rejected(dt, ratio, order);
-                    continue;
+                    let floor = report.retries >= time.max_halvings || 0.5 * dt < time.dt_min;
+                    let work = self.work_to(&state, dt);
+                    match self.audit(&state, work, pushed, floor, &mut report) {
+                        Ok(ledger) => state.pace.ledger = ledger,
+                        Err(failure) => {
+                            self.remember_sides(sides);
+                            self.refuse(dt, &failure);
+                            report.retries += 1;
+                            control.size = 0.5 * dt;
+                            if !floor {
+                                continue;
+                            }
+                            (report.dt, report.smallest_dt, report.substeps) = (dt, dt, 2);
+                            self.stand_still(t1);
+                            self.state.pace.control = control;
+                            return self.finish_step(report, started.elapsed().as_secs_f64());
+                        }
+                    }
+                    let refused = report.rejected + report.retries > 0;
+                    report.above_tolerance = ratio > 1.0;
+                    (report.dt, report.smallest_dt, report.substeps) = (dt, dt, 2);
+                    report.error = Some(error);
+                    self.commit(state, seconds);
+                    self.state.pace.control = control.accepted(dt, ratio, order, refused);
+                    #[cfg(test)]
+                    self.accepted.push([t1, dt]);
+                    return self.finish_step(report, started.elapsed().as_secs_f64());
                 }
                 Err(Failure::Stop(error)) => return Err(error),
                 Err(Failure::Device(reason)) => {
@@ -176,7 +196,9 @@ impl Simulation {
         first.note(report);
         second.note(report);
         let [a, b, c] = [&whole, &first, &second].map(Trial::seconds);
-        Ok(Doubled { state: end, error, sides, seconds: [0, 1].map(|k| a[k] + b[k] + c[k]) })
+        let pushed = first.pushed() + second.pushed();
+        let seconds = [0, 1].map(|k| a[k] + b[k] + c[k]);
+        Ok(Doubled { state: end, pushed, error, sides, seconds })
     }
 
     /// From the middle of a step, where the state is: the second half, the step's end, and its estimated error [m].

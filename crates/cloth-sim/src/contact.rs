@@ -220,7 +220,7 @@ shape = {{ type = "plane", half_size = 1.0 }}
         // An attempt that the guard gives up after its response leaves what was remembered.
         let before = sides(&retried).clone();
         retried.state.v[7].x = 1e6;
-        assert!(retried.attempt(0.052, 0.004, [0.004, 0.0], &mut crate::StepReport::default()).is_err());
+        assert!(retried.attempt(0.052, 0.004, false, &mut crate::StepReport::default()).is_err());
         assert_eq!(sides(&retried), &before);
         retried.state.v[7].x = 0.0;
         // The steps are reduced still: sides change over a few of them.

@@ -2,21 +2,26 @@
 //!
 //! Implicit dynamics lose energy, and so do friction and impact. But impulses move single vertices, which stiff cloth
 //! answers in the next solve only: a large step can make elastic energy out of nothing. The ledger holds the least energy \[J\]
-//! that the cloth has had since contact began, plus the most that moving colliders can have done since; a step that exceeds it by more
-//! than half of the energy that has been in the motion fails like any other, and is tried with half the size. After
-//! [`MAX_HALVINGS`] halvings it is accepted, and the report says how much was made.
+//! that the cloth has had since contact began, plus what has been done to it since: the work of pins and of air
+//! ([`cloth_core::Work`]; what they take away is not counted), and the most that moving colliders and pins can have done through
+//! contact. A step that exceeds it by more than half of the energy that has been in the motion fails like any other, and is tried with
+//! half the size. At the floor, `time.max_halvings` halvings, it is accepted, and the report says how much was made. But where that is
+//! more than all the energy that has been in the motion and nothing drives it, the cloth stays where it is and loses its velocity: a
+//! board of a millimetre that hits something with one corner would else be bent by more than it weighs, in every step.
 //!
-//! Nothing is looked at in scenes without contact, in steps in which nothing touches, while pins move, in wind, and under explicit integrators.
+//! Nothing is looked at in scenes without contact, in steps in which nothing touches, and under explicit integrators. With
+//! `effects.energy_account` energy and work are reported of all steps, whatever touches, and under any integrator.
 
+use crate::constraints::Holds;
 use crate::step::{Failure, State, touches};
-use crate::{Simulation, StepReport, Vec3};
+use crate::{EnergyReport, Simulation, StepReport, Vec3};
+use cloth_core::{Motion, Work};
 
-/// Halvings of a step for its energy: the energy that a contact makes falls with the square of the step or faster.
-pub(crate) const MAX_HALVINGS: u32 = 4;
 /// Part of the energy that has been in the motion which a step may make: what ordinary steps of contact make stays below.
 const ALLOWED: f64 = 0.5;
-/// Repulsion moves overlapping surfaces apart by this part of the thickness in a step.
-const REPULSION: f64 = 0.1;
+
+/// What repulsion may do in a step, as a multiple of what it does against gravity: layers that part are pushed unevenly.
+const PUSHED: f64 = 4.0;
 
 /// Energies that a step is judged by: a part of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -30,61 +35,116 @@ pub(crate) struct Ledger {
 }
 
 impl Simulation {
-    /// The ledger after the step of `dt` to `end`, part of a step of `whole` [s].
+    /// Whether a step to this end is judged by its energy.
+    fn judges(&self, end: &State) -> bool {
+        self.audited && touches(end)
+    }
+
+    /// Whether pins that move or wind do work on the cloth in a step to this end.
+    fn is_driven(&self, end: &State) -> bool {
+        let air = &self.scene.air;
+        let wind = air.wind != [0.0; 3] && (air.damping > 0.0 || air.density * (air.drag + air.lift) > 0.0);
+        let moves = |&v: &u32| end.x[v as usize] != self.state.x[v as usize];
+        wind || self.pins.vertices.iter().any(moves)
+    }
+
+    /// Ends a step at `t1` \[s\] where it started, all cloth at rest.
+    pub(crate) fn stand_still(&mut self, t1: f64) {
+        let state = &mut self.state;
+        state.time = t1;
+        state.v.fill(Vec3::zeros());
+        state.contact_force.fill(Vec3::zeros());
+        state.holds = Holds::default();
+    }
+
+    /// Work of pins and air on the cloth over the step from the state as it is to `end`; none where no account is kept.
+    pub(crate) fn work_to(&self, end: &State, dt: f64) -> Option<Work> {
+        if !(self.scene.effects.energy_account || self.judges(end)) {
+            return None;
+        }
+        let (from, to) = (Motion { x: &self.state.x, v: &self.state.v }, Motion { x: &end.x, v: &end.v });
+        Some(match self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) {
+            None => self.integrator.work(from, to, dt, &self.pins.vertices),
+            Some(awake) => awake.work(from, to, dt),
+        })
+    }
+
+    /// The ledger after the step to `end`, in which `work` was done and repulsion pushed by `pushed` \[kg m\]
+    /// ([`cloth_response::ResponseInfo::pushed`]).
     ///
-    /// With `accept` a step that made energy passes, and the ledger starts anew from there.
+    /// With `accept` a step that made energy passes, and the ledger starts anew from there; but for one that made too much.
     pub(crate) fn audit(
         &self,
         end: &State,
-        whole: f64,
+        work: Option<Work>,
+        pushed: Vec3,
         accept: bool,
         report: &mut StepReport,
     ) -> Result<Ledger, Failure> {
         let ledger = self.state.pace.ledger;
-        if !self.audited || !touches(end) {
-            return Ok(ledger);
-        }
-        // What sleeps has its own system.
-        if self.sleeper.as_ref().is_some_and(|s| s.awake.is_some()) {
-            return Ok(Ledger::default());
-        }
-        let start = &self.state.x;
-        if self.pins.vertices.iter().any(|&v| end.x[v as usize] != start[v as usize]) {
-            return Ok(Ledger::default());
-        }
-        let system = self.integrator.system();
+        // What is done to the cloth while nothing touches is not followed: the next contact begins anew.
+        let untouched = || if self.is_driven(end) { Ledger::default() } else { ledger };
+        let Some(work) = work else { return Ok(untouched()) };
         let sums = |x: &[Vec3], v: &[Vec3]| {
-            let energy = system.energy(x, v);
+            let energy = self.energy_at(x, v);
             (energy.total(), energy.total() - energy.gravity)
         };
+        let (energy, moving) = sums(&end.x, &end.v);
+        let entry = EnergyReport { total: energy, pins: work.pins, air: work.air };
+        if !self.judges(end) {
+            note(report, entry);
+            return Ok(untouched());
+        }
         let ledger = if ledger.open {
             ledger
         } else {
-            let (level, scale) = sums(start, &self.state.v);
+            let (level, scale) = sums(&self.state.x, &self.state.v);
             Ledger { open: true, level, scale }
         };
-        // Contact cannot do more than push along the fastest collider.
-        let cloth = self.bodies.cloth_vertices;
-        let way =
-            (cloth..start.len()).map(|i| (end.x[i] - start[i]).norm_squared()).fold(0.0, f64::max).sqrt();
-        let pushes = end.contact_force.iter().take(cloth).chain(&end.holds.force);
-        let work = if way > 0.0 { way * pushes.map(Vec3::norm).sum::<f64>() } else { 0.0 };
-        let level = ledger.level + work;
-
-        let (energy, moving) = sums(&end.x, &end.v);
-        let mass: f64 = system.masses().iter().sum();
-        let thickness = self.scene.contact.as_ref().map_or(0.0, |c| c.thickness);
-        let gravity = Vec3::from(self.scene.gravity()).norm();
-        let opening = mass * (gravity * thickness + 0.5 * (REPULSION * thickness / whole).powi(2));
-        let made = energy - level;
+        // What starts nearer than its thickness is moved apart, against gravity where it has to be, and bent on the way.
+        let gravity = Vec3::from(self.scene.gravity());
+        let lifted = PUSHED * (-gravity.dot(&pushed)).max(0.0);
+        let through_contact = self.most_through_contact(end);
+        let level = ledger.level + work.pins.max(0.0) + work.air.max(0.0) + through_contact + lifted;
+        let (made, opening) = (energy - level, self.opening());
         if made > ALLOWED * ledger.scale + opening {
-            if !accept {
+            let runs_away = made > ledger.scale + opening && through_contact == 0.0 && !self.is_driven(end);
+            if !accept || runs_away {
                 return Err(Failure::Energy { made, level });
             }
             report.energy_made += made;
-            return Ok(Ledger { open: true, level: energy, scale: ledger.scale.max(moving) });
+            note(report, entry);
+            // What was made is none of the motion's.
+            return Ok(Ledger { open: true, level: energy, scale: ledger.scale });
         }
+        note(report, entry);
         let scale = if made <= 0.0 { ledger.scale.max(moving) } else { ledger.scale };
         Ok(Ledger { open: true, level: level.min(energy), scale })
     }
+
+    /// The most that contact can have done to the cloth in a step: pushing along the way of the fastest collider or pin [J].
+    fn most_through_contact(&self, end: &State) -> f64 {
+        let cloth = self.bodies.cloth_vertices;
+        let pins = self.pins.vertices.iter().map(|&v| v as usize);
+        let way = (cloth..end.x.len())
+            .chain(pins)
+            .map(|i| (end.x[i] - self.state.x[i]).norm_squared())
+            .fold(0.0, f64::max)
+            .sqrt();
+        let pushes = end.contact_force.iter().take(cloth).chain(&end.holds.force);
+        if way > 0.0 { way * pushes.map(Vec3::norm).sum::<f64>() } else { 0.0 }
+    }
+
+    /// What opening surfaces that overlap by their thickness may lift the cloth [J].
+    fn opening(&self) -> f64 {
+        let mass: f64 = self.masses().iter().sum();
+        let thickness = self.scene.contact.as_ref().map_or(0.0, |c| c.thickness);
+        mass * Vec3::from(self.scene.gravity()).norm() * thickness
+    }
+}
+
+/// Adds the work of a part of a step, and its energy at the end.
+fn note(report: &mut StepReport, entry: EnergyReport) {
+    let sum = report.energy.get_or_insert_default();
+    *sum = EnergyReport { total: entry.total, pins: sum.pins + entry.pins, air: sum.air + entry.air };
 }

@@ -50,7 +50,7 @@ pub use error::SimError;
 pub use pace::Advance;
 pub use plan::{Effect, Plan};
 pub use report::{
-    Chosen, ContactReport, Detection, EffectCost, Fallback, Refused, Report, StepReport, Totals,
+    Chosen, ContactReport, Detection, EffectCost, EnergyReport, Fallback, Refused, Report, StepReport, Totals,
 };
 pub use scene::{Scene, SceneError};
 pub use simulation::{Simulation, SimulationOptions};

@@ -10,8 +10,10 @@
 
 use crate::auto_step::Control;
 use crate::guard::Alarm;
-use crate::ledger::{self, Ledger};
+use crate::ledger::Ledger;
+use crate::plan::ELASTIC_HINGES;
 use crate::report::{Refused, add_seconds};
+use crate::scene::Choice;
 use crate::step::Failure;
 use crate::{SimError, Simulation, StepReport};
 use std::ops::ControlFlow;
@@ -196,7 +198,6 @@ impl Simulation {
             return Ok(());
         }
         let fraction = |units: u64| units as f64 / whole as f64;
-        let least = way.dt * 0.5_f64.powi(ledger::MAX_HALVINGS.min(self.scene.time.max_halvings) as i32);
         let pace = self.state.pace;
         // The parts of a doubled size end where whole ones do.
         if pace.good >= GROW_AFTER && way.done.is_multiple_of(2 * (whole >> pace.halvings)) {
@@ -207,7 +208,7 @@ impl Simulation {
             let last = way.done + size == whole;
             let t1 = if last { way.end } else { way.start + way.dt * fraction(way.done + size) };
             let dt = way.dt * fraction(size);
-            let failure = match self.attempt(t1, dt, [way.dt, least], &mut way.report) {
+            let failure = match self.attempt(t1, dt, size == 1, &mut way.report) {
                 Ok(()) => {
                     #[cfg(test)]
                     self.accepted.push([t1, dt]);
@@ -247,6 +248,7 @@ impl Simulation {
         let clock = Instant::now();
         self.fall_asleep(report.dt)?;
         report.asleep = self.state.rest.sleepers();
+        report.remembering = self.note_history();
         self.state.step += 1;
         report.step = self.state.step;
         report.time = self.state.time;
@@ -266,6 +268,16 @@ impl Simulation {
         Ok(())
     }
 
+    /// How many hinges remember, with `effects.history = "auto"`; notes the memory that this takes.
+    fn note_history(&mut self) -> Option<usize> {
+        if self.scene.effects.history == Choice::On {
+            return None;
+        }
+        let histories = self.histories();
+        self.report.grow(ELASTIC_HINGES, histories.iter().map(|h| h.bytes).sum());
+        Some(histories.iter().map(|h| h.kept).sum())
+    }
+
     /// Notes that an attempt of `dt` [s] from here was given up.
     pub(crate) fn refuse(&mut self, dt: f64, failure: &Failure) {
         let (step, time) = (self.state.step + 1, self.state.time);
@@ -278,8 +290,15 @@ impl Simulation {
         match failure {
             Failure::Alarm(Alarm { reason, vertices }) => SimError::Diverged { time, reason, vertices },
             Failure::Unresolved { pairs, vertices } => SimError::Stuck { time, pairs, vertices },
-            Failure::Energy { .. } | Failure::Wake(_) => {
-                SimError::Diverged { time, reason: failure.to_string(), vertices: Vec::new() }
+            Failure::Strained { .. } | Failure::Energy { .. } | Failure::Wake(_) => {
+                let reason = failure.to_string();
+                let mut vertices = match failure {
+                    Failure::Strained { edges, .. } => edges.concat(),
+                    _ => Vec::new(),
+                };
+                vertices.sort_unstable();
+                vertices.dedup();
+                SimError::Diverged { time, reason, vertices }
             }
             Failure::Device(reason) => SimError::Stage { stage: "detection", message: reason },
             Failure::Stop(error) => error,

@@ -1,16 +1,17 @@
 //! Which effects a scene runs, which it does not, and why: known before the first step.
 
+mod contact;
+
 use crate::bodies::Bodies;
 use crate::contact::ContactStage;
 use crate::cost;
-use crate::friction::LawName;
 use crate::pins::PinSet;
 use crate::report::Detection;
-use crate::scene::{Choice, Contact, ContactMethod, Start};
+use crate::scene::{Choice, Start};
 use crate::step::State;
 use crate::{Scene, SceneError};
 use cloth_core::{CoreError, Integrator};
-use cloth_response::FrictionLaw;
+use contact::{plan_auto, plan_contact, plan_strain};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -141,6 +142,9 @@ const DYNAMICS: [(&str, &str, &str); 11] = [
 /// The effect of `start = "untangle"`.
 const UNTANGLED: &str = "untangled start";
 
+/// The effect of `effects.history = "auto"`.
+pub(crate) const ELASTIC_HINGES: &str = "elastic hinges";
+
 /// Collects effects that are on and effects that are off.
 #[derive(Default)]
 struct Effects {
@@ -224,6 +228,7 @@ pub(crate) fn build(
         bodies.cloth_vertices,
         integrator.bytes(),
     );
+    plan_history(&mut effects, scene, integrator);
     plan_steps(&mut effects, scene, bodies);
     match (scene.start, &scene.contact) {
         (Start::Untangle, Some(_)) => effects.on(UNTANGLED, "start = \"untangle\"", 0, 0),
@@ -245,6 +250,11 @@ pub(crate) fn build(
     plan_strain(&mut effects, scene, contact);
     plan_auto(&mut effects, scene, bodies, contact);
     effects.on("guard", "always", bodies.cloth_vertices, 0);
+    if scene.effects.energy_account {
+        effects.on("energy account", "effects.energy_account", bodies.cloth_vertices, 0);
+    } else {
+        effects.off("energy account", "effects.energy_account is false: kept only where contact touches");
+    }
 
     let mut warnings = Vec::new();
     let stable_dt = method.has_stability_limit().then(|| integrator.stable_step(&state.x, &state.v));
@@ -291,6 +301,34 @@ pub(crate) fn build(
     }
 }
 
+/// Which hinges remember their path.
+fn plan_history(effects: &mut Effects, scene: &Scene, integrator: &Integrator) {
+    if scene.effects.history == Choice::On {
+        return effects
+            .off(ELASTIC_HINGES, "effects.history = \"on\": all hinges of laws with memory remember");
+    }
+    let histories = integrator.system().histories();
+    let has = |law: &str| histories.iter().any(|h| h.law == law);
+    let mut ranges = Vec::new();
+    if has("plastic") {
+        ranges.push("plastic up to its elastic_limit, which changes nothing".to_owned());
+    }
+    if has("hysteresis") {
+        let tolerance = scene.effects.history_tolerance;
+        let share = 100.0 * 2.0 * tolerance / (2.0 - tolerance);
+        ranges.push(format!(
+            "hysteresis up to {share:.3} % of its transition_curvature, with moments right to history_tolerance = {tolerance} of \
+             the frictional moment"
+        ));
+    }
+    if ranges.is_empty() {
+        return effects.off(ELASTIC_HINGES, "no material has bending.model = \"plastic\" or \"hysteresis\"");
+    }
+    let why =
+        format!("effects.history = \"auto\": no history before a hinge is bent more ({})", ranges.join("; "));
+    effects.on(ELASTIC_HINGES, why, histories.iter().map(|h| h.hinges).sum(), 0);
+}
+
 /// How steps are cut: where one fails, and by their error.
 fn plan_steps(effects: &mut Effects, scene: &Scene, bodies: &Bodies) {
     const ADAPTIVE: &str = "adaptive step";
@@ -317,181 +355,6 @@ fn plan_steps(effects: &mut Effects, scene: &Scene, bodies: &Bodies) {
         effects.off(ADAPTIVE, "time.max_halvings is zero, or time.dt_min leaves no room");
     }
     effects.off(CONTROLLED, "time.dt is a number");
-}
-
-fn plan_contact(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Option<&ContactStage>) {
-    let (Some(stage), Some(contact)) = (stage, &scene.contact) else {
-        for name in ["contact", "contact constraints", "self-contact", "collider contact", "friction"] {
-            effects.off(name, "the scene has no [contact]");
-        }
-        for law in LawName::ALL {
-            effects.off(&law_effect(law), "the scene has no [contact]");
-        }
-        effects.off("intersection count", "the scene has no [contact]");
-        return;
-    };
-    let mesh = &stage.mesh;
-    effects.on(
-        "contact",
-        format!("[contact] with detector \"{}\"", stage.continuous.detection.detector),
-        mesh.triangles.len(),
-        stage.bytes(),
-    );
-    match contact.method {
-        ContactMethod::VelocityFilter => {
-            effects.off("contact constraints", "contact.method = \"velocity-filter\"");
-        }
-        ContactMethod::Constraints => {
-            let why =
-                "contact.method = \"constraints\": cloth vertices on colliders (its memory is contact's)";
-            effects.on("contact constraints", why, bodies.cloth_vertices, 0);
-        }
-    }
-    let selves = bodies.cloth.iter().zip(&mesh.bodies).filter(|(_, rule)| rule.self_collision);
-    let self_triangles: usize = selves.map(|(c, _)| c.mesh.triangles.len()).sum();
-    if self_triangles > 0 {
-        effects.on("self-contact", "contact.self and cloth.self_collision", self_triangles, 0);
-    } else {
-        effects.off("self-contact", "contact.self is false, or each cloth's self_collision is");
-    }
-    let others: usize = bodies.colliders.iter().map(|c| c.triangles.len()).sum();
-    if others > 0 {
-        effects.on("collider contact", "the scene has colliders", others, 0);
-    } else {
-        effects.off("collider contact", "the scene has no collider");
-    }
-    plan_friction(effects, scene, contact, stage);
-    if stage.allow {
-        effects.on("intersection count", "intersections are allowed", mesh.triangles.len(), 0);
-    } else {
-        effects.off("intersection count", "intersections are not allowed, so there are none");
-    }
-}
-
-/// Name of the effect of a friction law.
-fn law_effect(law: LawName) -> String {
-    format!("friction {}", law.name())
-}
-
-/// One effect per friction law, with the number of pairs of bodies that have it, and one for all of them.
-fn plan_friction(effects: &mut Effects, scene: &Scene, contact: &Contact, stage: &ContactStage) {
-    /// Keys that are named.
-    const NAMED: usize = 4;
-    let (cloths, bodies) = (scene.cloth.len(), stage.mesh.bodies.len());
-    let meeting = (0..cloths)
-        .flat_map(|a| (a..bodies).map(move |b| (a, b)))
-        .filter(|&(a, b)| a != b || stage.mesh.bodies[a].self_collision);
-    // Of each law: pairs, and the keys that ask for it with the kind of pair.
-    let mut found = LawName::ALL.map(|law| (law, 0, Vec::<String>::new()));
-    for (a, b) in meeting {
-        let law = scene.friction_law(contact, a, b);
-        let viscous = matches!(law, FrictionLaw::Viscous { f_v, .. } if f_v > 0.0);
-        if !(law.static_coefficient() > 0.0 || viscous) {
-            continue;
-        }
-        let kind = match (a == b, b < cloths) {
-            (true, _) => "self-contact",
-            (_, true) => "cloth on cloth",
-            _ => "colliders",
-        };
-        let Some((_, pairs, keys)) = found.iter_mut().find(|(name, ..)| name.name() == law.name()) else {
-            continue;
-        };
-        *pairs += 1;
-        let key = format!("{kind}: {}", scene.friction_entry(contact, a, b).0);
-        if !keys.contains(&key) {
-            keys.push(key);
-        }
-    }
-    let pairs = found.iter().map(|(_, pairs, _)| pairs).sum();
-    if pairs > 0 {
-        let table = size_of::<u16>() * bodies * bodies;
-        effects.on("friction", "a coefficient of friction above zero", pairs, table);
-    } else {
-        effects.off("friction", "every coefficient of friction is zero");
-    }
-    for (law, pairs, keys) in found {
-        if pairs == 0 {
-            effects
-                .off(&law_effect(law), format!("no pair of bodies that meet has law = \"{}\"", law.name()));
-            continue;
-        }
-        let more =
-            if keys.len() > NAMED { format!(" and {} more", keys.len() - NAMED) } else { String::new() };
-        let why = keys[..keys.len().min(NAMED)].join(", ") + &more;
-        effects.on(&law_effect(law), why, pairs, 0);
-    }
-}
-
-/// The effect of limited edges.
-fn plan_strain(effects: &mut Effects, scene: &Scene, stage: Option<&ContactStage>) {
-    match stage.filter(|stage| stage.limited_edges > 0) {
-        None => effects.off("strain limit", "no cloth has a strain_limit"),
-        Some(stage) if scene.contact.is_some() => {
-            let why = "cloth with strain_limit (its memory is contact's)";
-            effects.on("strain limit", why, stage.limited_edges, 0);
-        }
-        Some(stage) => {
-            effects.on("strain limit", "cloth with strain_limit", stage.limited_edges, stage.bytes());
-        }
-    }
-}
-
-/// What the engine decides by itself, step by step.
-fn plan_auto(effects: &mut Effects, scene: &Scene, bodies: &Bodies, stage: Option<&ContactStage>) {
-    let meeting = stage.filter(|_| scene.contact.is_some());
-    let selves = meeting.is_some_and(|s| s.mesh.bodies.iter().any(|b| b.self_collision));
-    match (scene.effects.self_collision, meeting) {
-        (Choice::On, _) => effects.off("flatness proofs", "effects.self_collision = \"on\""),
-        (Choice::Auto, Some(stage)) if selves => {
-            let why = "effects.self_collision = \"auto\": no search of cloth near itself where normals and contour prove it flat";
-            effects.on("flatness proofs", why, stage.mesh.triangles.len(), 0);
-        }
-        (Choice::Auto, _) => effects.off("flatness proofs", "no cloth meets itself"),
-    }
-    match (scene.effects.ccd, meeting) {
-        (Choice::On, _) => effects.off("gap proofs", "effects.ccd = \"on\""),
-        (Choice::Auto, Some(stage)) => {
-            let why = "effects.ccd = \"auto\": no continuous detection of what moves less than its gap";
-            effects.on("gap proofs", why, stage.mesh.vertex_count, 0);
-        }
-        (Choice::Auto, None) => effects.off("gap proofs", "the scene has no [contact]"),
-    }
-    plan_slow_friction(effects, scene, meeting);
-    match scene.effects.sleep {
-        None => effects.off("sleep", "the scene has no effects.sleep"),
-        Some(sleep) => {
-            let why = format!("effects.sleep: cloth slower than {} m/s for {} s", sleep.speed, sleep.time);
-            effects.on("sleep", why, bodies.cloth.len(), 2 * bodies.vertices);
-        }
-    }
-}
-
-/// Steps without the terms of friction that depend on speed.
-fn plan_slow_friction(effects: &mut Effects, scene: &Scene, meeting: Option<&ContactStage>) {
-    let name = "slow friction";
-    if scene.effects.friction == Choice::On {
-        return effects.off(name, "effects.friction = \"on\"");
-    }
-    let Some(stage) = meeting else {
-        return effects.off(name, "the scene has no [contact]");
-    };
-    if stage.constraints.is_some() {
-        return effects.off(name, "contact.method = \"constraints\" has a friction of its own");
-    }
-    let Some(speed) = stage.responder.slow_speed() else {
-        return effects.off(name, "all laws are Coulomb's: no term depends on speed");
-    };
-    let when = if speed == f64::INFINITY {
-        "in all steps, as no law differs by more".to_owned()
-    } else if speed > 0.0 {
-        format!("while no contact can slide faster than {speed:.3e} m/s")
-    } else {
-        "while all contacts stick".to_owned()
-    };
-    let tolerance = scene.effects.friction_tolerance;
-    let why = format!("effects.friction = \"auto\": Coulomb's law {when} (friction_tolerance {tolerance})");
-    effects.on(name, why, stage.mesh.bodies.len(), 0);
 }
 
 /// The name of a choice as a scene file writes it.

@@ -130,6 +130,9 @@ pub struct StepReport {
     /// Energy that contact made out of nothing, and smaller sub-steps too [J].
     #[serde(default)]
     pub energy_made: f64,
+    /// Energy and work, where contact touched under an implicit integrator or `effects.energy_account` asks for them.
+    #[serde(default)]
+    pub energy: Option<EnergyReport>,
     /// Attempts refused because of their error, under `time.dt = "auto"`.
     #[serde(default)]
     pub rejected: u32,
@@ -150,6 +153,9 @@ pub struct StepReport {
     /// Pieces of cloth that sleep at the end.
     #[serde(default)]
     pub asleep: usize,
+    /// Hinges that remember their path as the last attempt begins, with `effects.history = "auto"`.
+    #[serde(default)]
+    pub remembering: Option<usize>,
     /// Contact, if the scene has it.
     pub contact: Option<ContactReport>,
     /// Pairs of triangles that pass through each other at the end, counted where the scene allows them.
@@ -158,6 +164,17 @@ pub struct StepReport {
     pub seconds: Vec<(String, f64)>,
     /// Seconds per force model, a part of the stages' ("forces", "linearise", "assemble", "line search").
     pub forces: Vec<(String, f64)>,
+}
+
+/// Mechanical energy of the cloth, and what was done to it.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct EnergyReport {
+    /// Kinetic, elastic and gravity energy at the end of the step [J].
+    pub total: f64,
+    /// Work of pins on the cloth in the step [J].
+    pub pins: f64,
+    /// Work of the air on the cloth in the step [J]: of wind, or against drag.
+    pub air: f64,
 }
 
 /// Contact in one step.

@@ -6,12 +6,12 @@ use crate::device::{Device, SharedGpu};
 use crate::guard::Guard;
 use crate::pace::{Pending, UnderWay};
 use crate::pins::PinSet;
-use crate::scene::{Contact, Start};
+use crate::scene::{Choice, Contact, Start};
 use crate::sleep::{Rest, Sleeper};
 use crate::step::State;
 use crate::untangle::{Limits, Tangled, untangle};
 use crate::{Assets, BodyInfo, EffectCost, Plan, Report, Scene, SimError, Vec3, plan};
-use cloth_core::{ClothPart, ClothSystem, Energy, Environment, Integrator, IntegratorParams};
+use cloth_core::{ClothPart, ClothSystem, CoreError, Energy, Environment, Integrator, IntegratorParams};
 use std::sync::Arc;
 
 /// How to run, as opposed to what.
@@ -107,11 +107,11 @@ impl Simulation {
 
         let pool = Arc::new(thread_pool(options.threads)?);
         let parts: Vec<ClothPart<'_>> = bodies.cloth.iter().flat_map(cloth_parts).collect();
-        let core_error =
-            |error: cloth_core::CoreError| SimError::InvalidScene(plan::core_error(scene, &error));
+        let core_error = |error: CoreError| SimError::InvalidScene(plan::core_error(scene, &error));
         let mut system =
             ClothSystem::new(&parts, &environment(scene), bodies.cloth_vertices).map_err(core_error)?;
         system.sew(bodies.stitches()).map_err(core_error)?;
+        keep_history(scene, &mut system).map_err(core_error)?;
         let mut inv_mass: Vec<f64> = system.masses().iter().map(|m| m.recip()).collect();
         inv_mass.resize(bodies.vertices, 0.0);
         for &v in &pins.vertices {
@@ -161,7 +161,7 @@ impl Simulation {
             integrator,
             contact,
             inv_mass,
-            audited: is_passive(scene),
+            audited: !scene.time.integrator.is_explicit(),
             state,
             pending: None,
             under_way: None,
@@ -221,9 +221,14 @@ impl Simulation {
 
     /// Mechanical energy of the cloth [J].
     pub fn energy(&self) -> Energy {
+        self.energy_at(&self.state.x, &self.state.v)
+    }
+
+    /// That of a state near this one, with what laws remember of the path to here.
+    pub(crate) fn energy_at(&self, x: &[Vec3], v: &[Vec3]) -> Energy {
         match self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) {
-            None => self.integrator.system().energy(&self.state.x, &self.state.v),
-            Some(awake) => awake.energy(&self.state.x, &self.state.v),
+            None => self.integrator.system().energy(x, v),
+            Some(awake) => awake.energy(x, v),
         }
     }
 
@@ -352,13 +357,6 @@ impl Simulation {
     }
 }
 
-/// Whether nothing but pins and colliders can add energy, and the integrator adds none.
-fn is_passive(scene: &Scene) -> bool {
-    let air = &scene.air;
-    let wind = air.wind != [0.0; 3] && (air.damping > 0.0 || air.density * (air.drag + air.lift) > 0.0);
-    !wind && !scene.time.integrator.is_explicit()
-}
-
 /// A cloth as a part of one material, or as its parts.
 fn cloth_parts(body: &ClothBody) -> Vec<ClothPart<'_>> {
     let ClothBody { mesh, topology, rest, first_vertex, .. } = body;
@@ -401,6 +399,14 @@ pub(crate) fn environment(scene: &Scene) -> Environment {
         drag: scene.air.drag,
         lift: scene.air.lift,
         air_damping: scene.air.damping,
+    }
+}
+
+/// Lets laws with memory remember what the scene asks for.
+pub(crate) fn keep_history(scene: &Scene, system: &mut ClothSystem) -> Result<(), CoreError> {
+    match scene.effects.history {
+        Choice::On => Ok(()),
+        Choice::Auto => system.remember_beyond(scene.effects.history_tolerance),
     }
 }
 

@@ -3,18 +3,20 @@
 //! Prescribed targets at t + dt → dynamics → response → guard → commit. A step that fails at any stage leaves the state
 //! as it was; how it is tried again is said in [`crate::pace`].
 
+mod response;
+mod targets;
+
 use crate::bodies::Bodies;
 use crate::constraints::{Holds, failure};
-use crate::contact::{ContactStage, seconds_of_detection, stage};
+use crate::contact::seconds_of_detection;
 use crate::guard::Alarm;
 use crate::pace::Pace;
 use crate::pins::PinSet;
 use crate::report::add_seconds;
 use crate::sleep::Rest;
 use crate::{SimError, Simulation, StepReport, Vec3};
-use cloth_collision::DetectError;
-use cloth_core::{Pins, StepInfo};
-use cloth_response::{ResponseError, ResponseInfo, Resting};
+use cloth_core::{Pins, StepInfo, Work};
+use cloth_response::ResponseInfo;
 use std::time::Instant;
 
 /// The state that a checkpoint holds.
@@ -84,6 +86,11 @@ pub(crate) enum Failure {
         pairs: Vec<[u32; 4]>,
         vertices: Vec<u32>,
     },
+    /// Strain limits that contact, pins or zones left no room for: these edges, and the largest excess of their length.
+    Strained {
+        edges: Vec<[u32; 2]>,
+        excess: f64,
+    },
     /// Contact made so much energy beyond what there may be [J].
     Energy {
         made: f64,
@@ -103,6 +110,8 @@ pub(crate) struct Trial {
     dynamics: StepInfo,
     /// What response did, and the solves of contact constraints.
     contact: Option<(ResponseInfo, usize)>,
+    /// Of pins and air, where it is asked for.
+    pub(crate) work: Option<Work>,
     /// What it took [s].
     seconds: f64,
 }
@@ -111,6 +120,11 @@ impl Trial {
     /// Seconds of continuous detection, and of all.
     pub(crate) fn seconds(&self) -> [f64; 2] {
         [self.contact.as_ref().map_or(0.0, |(info, _)| seconds_of_detection(info)), self.seconds]
+    }
+
+    /// Σ m times the way of repulsion's pushes [kg m].
+    pub(crate) fn pushed(&self) -> Vec3 {
+        self.contact.as_ref().map_or_else(Vec3::zeros, |(info, _)| info.pushed)
     }
 
     /// Adds the counts of its dynamics to the step's.
@@ -143,6 +157,13 @@ impl std::fmt::Display for Failure {
         match self {
             Self::Alarm(alarm) => write!(f, "diverged: {}", alarm.reason),
             Self::Unresolved { pairs, .. } => write!(f, "stuck: {} pairs still collide", pairs.len()),
+            Self::Strained { edges, excess } => {
+                let count = edges.len();
+                write!(
+                    f,
+                    "{count} edges stay beyond their strain limit, by up to {excess:.1e} of their length"
+                )
+            }
             Self::Energy { made, level } => {
                 write!(f, "contact made {made:.3e} J of mechanical energy beyond {level:.3e} J")
             }
@@ -154,18 +175,26 @@ impl std::fmt::Display for Failure {
 }
 
 impl Simulation {
-    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace. Part of a step of `whole` \[s\];
-    /// at `least` \[s\] energy that contact makes is accepted and reported.
+    /// The motion over `dt` to time `t1`: accepted and written, or given up without a trace. At the `floor` of step sizes
+    /// energy that contact makes is accepted and reported; where it is more than there was in the motion, the cloth stops instead.
     pub(crate) fn attempt(
         &mut self,
         t1: f64,
         dt: f64,
-        [whole, least]: [f64; 2],
+        floor: bool,
         report: &mut StepReport,
     ) -> Result<(), Failure> {
         let mut trial = self.trial(t1, dt, report)?;
-        let floor = dt <= least || 0.5 * dt < self.scene.time.dt_min;
-        trial.state.pace.ledger = self.audit(&trial.state, whole, floor, report)?;
+        let floor = floor || 0.5 * dt < self.scene.time.dt_min;
+        trial.state.pace.ledger = match self.audit(&trial.state, trial.work, trial.pushed(), floor, report) {
+            Err(failure @ Failure::Energy { .. }) if floor => {
+                self.refuse(dt, &failure);
+                trial.note_work(report);
+                self.stand_still(t1);
+                return Ok(());
+            }
+            judged => judged?,
+        };
         trial.note(report);
         let seconds = trial.seconds();
         self.commit(trial.state, seconds);
@@ -199,58 +228,9 @@ impl Simulation {
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let (state, info) = self.meet(t1, dt, x, v, holds, report)?;
+        let work = self.work_to(&state, dt);
         let seconds = started.elapsed().as_secs_f64();
-        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), seconds })
-    }
-
-    /// The state at `t1` after response to the motion from the state as it is to `x` with end velocities `v`.
-    pub(crate) fn meet(
-        &mut self,
-        t1: f64,
-        dt: f64,
-        mut x: Vec<Vec3>,
-        mut v: Vec<Vec3>,
-        holds: Holds,
-        report: &mut StepReport,
-    ) -> Result<(State, Option<ResponseInfo>), Failure> {
-        let v_free = self.contact.is_some().then(|| v.clone());
-        let info = self.response(dt, &mut x, &mut v, report)?;
-        if info.is_some() {
-            self.check(&x, &v, report)?;
-        }
-        let contact_force = v_free.map_or_else(Vec::new, |v_free| {
-            let force = |i: usize| {
-                if self.inv_mass[i] > 0.0 {
-                    (v[i] - v_free[i]) / (dt * self.inv_mass[i])
-                } else {
-                    self.resting_force(i)
-                }
-            };
-            (0..v.len()).map(force).collect()
-        });
-        let (step, pace, rest) = (self.state.step, self.state.pace, self.state.rest.clone());
-        Ok((State { time: t1, step, pace, rest, x, v, contact_force, holds }, info))
-    }
-
-    /// Adds the impulse that contact is expected to give, dt f/m with the force f of the last step.
-    ///
-    /// Response works on single vertices, the implicit step on all that hang together: cloth that presses on a collider
-    /// would give way inwards as a whole and be put back vertex by vertex, stretched. With the expected force the
-    /// implicit step finds the balance that contact will keep. [`Simulation::forget_contact`] takes the same impulse
-    /// out again, so that response decides freshly: a contact that is gone leaves nothing.
-    fn expect_contact(&self, dt: f64, v: &mut [Vec3]) {
-        for (i, force) in self.state.contact_force.iter().enumerate() {
-            v[i] += force * (dt * self.inv_mass[i]);
-        }
-    }
-
-    /// Takes the expected impulse out of the velocity and of the motion.
-    fn forget_contact(&self, dt: f64, x: &mut [Vec3], v: &mut [Vec3]) {
-        for (i, force) in self.state.contact_force.iter().enumerate() {
-            let change = force * (dt * self.inv_mass[i]);
-            v[i] -= change;
-            x[i] -= change * dt;
-        }
+        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), work, seconds })
     }
 
     /// The end of the step without contact but for constraints, what those did, and their solves.
@@ -286,104 +266,11 @@ impl Simulation {
         Ok((info, holds, solves))
     }
 
-    /// Makes the motion free of known collisions; `None` for a scene without contact.
-    fn response(
-        &mut self,
-        dt: f64,
-        x: &mut [Vec3],
-        v: &mut [Vec3],
-        report: &mut StepReport,
-    ) -> Result<Option<ResponseInfo>, Failure> {
-        let Some(ContactStage { mesh, bvh, continuous, responder, .. }) = &mut self.contact else {
-            return Ok(None);
-        };
-        let (x_t0, masses, pool) = (&self.state.x, &self.inv_mass, &self.pool);
-        if let Some(sleeper) = &mut self.sleeper {
-            let resting = Resting { moving: &sleeper.moving, asleep: &sleeper.asleep };
-            let result = responder.respond_resting(
-                mesh,
-                bvh,
-                continuous.other(),
-                resting,
-                masses,
-                x_t0,
-                x,
-                v,
-                dt,
-                pool,
-            );
-            let mut info = result.map_err(|error| response_failure(error, &sleeper.asleep))?;
-            sleeper.meetings = std::mem::take(&mut info.meetings);
-            for (name, seconds) in &info.seconds {
-                add_seconds(&mut report.seconds, name, *seconds);
-            }
-            return Ok(Some(info));
-        }
-        let result = match continuous.other() {
-            None => responder.respond(mesh, bvh, masses, x_t0, x, v, dt, pool),
-            Some(other) => responder.respond_with(mesh, bvh, other, masses, x_t0, x, v, dt, pool),
-        };
-        let info = result.map_err(|error| response_failure(error, &[]))?;
-        for (name, seconds) in &info.seconds {
-            add_seconds(&mut report.seconds, name, *seconds);
-        }
-        Ok(Some(info))
-    }
-
-    /// Writes where colliders are at `t1`, and the mean velocity of their way there.
-    fn move_colliders(&self, t1: f64, dt: f64, x: &mut [Vec3], v: &mut [Vec3], report: &mut StepReport) {
-        let clock = Instant::now();
-        let mut any = false;
-        for body in self.bodies.colliders.iter().filter(|body| body.motion.moves()) {
-            let range = body.first_vertex..body.first_vertex + body.motion.vertex_count();
-            body.motion.write(t1, &mut x[range.clone()]);
-            for i in range {
-                v[i] = (x[i] - self.state.x[i]) / dt;
-            }
-            any = true;
-        }
-        if any {
-            add_seconds(&mut report.seconds, "moving colliders", clock.elapsed().as_secs_f64());
-        }
-    }
-
-    /// Where pins are at `t1`, when colliders are as in `x`, and the mean velocity of their way there.
-    fn move_pins(&self, t1: f64, dt: f64, x: &[Vec3], report: &mut StepReport) -> (Vec<Vec3>, Vec<Vec3>) {
-        if self.pins.vertices.is_empty() {
-            return (Vec::new(), Vec::new());
-        }
-        let clock = Instant::now();
-        let mut pin_x = vec![Vec3::zeros(); self.pins.vertices.len()];
-        self.pins.write(&self.bodies, t1, x, &mut pin_x);
-        let start = |i: u32| self.state.x[i as usize];
-        let pin_v = self.pins.vertices.iter().zip(&pin_x).map(|(&i, p)| (p - start(i)) / dt).collect();
-        add_seconds(&mut report.seconds, "pins", clock.elapsed().as_secs_f64());
-        (pin_x, pin_v)
-    }
-
-    pub(crate) fn check(&self, x: &[Vec3], v: &[Vec3], report: &mut StepReport) -> Result<(), Failure> {
+    pub(crate) fn check(&mut self, x: &[Vec3], v: &[Vec3], report: &mut StepReport) -> Result<(), Failure> {
         let clock = Instant::now();
         let result = self.guard.check(&self.state.x, x, v).map_err(Failure::Alarm);
         add_seconds(&mut report.seconds, "guard", clock.elapsed().as_secs_f64());
         result
-    }
-}
-
-/// What an error of the response is to the step loop. `asleep`: per vertex; empty where nothing sleeps.
-fn response_failure(error: ResponseError, asleep: &[bool]) -> Failure {
-    let sleeps = |v: &u32| asleep.get(*v as usize).copied().unwrap_or(false);
-    match error {
-        ResponseError::Asleep { vertices } => Failure::Wake(vertices),
-        // Sleeping cloth does not give way; awake it may.
-        ResponseError::Unresolved { vertices, .. } if vertices.iter().any(sleeps) => {
-            Failure::Wake(vertices.into_iter().filter(sleeps).collect())
-        }
-        ResponseError::Unresolved { pairs, vertices } => Failure::Unresolved { pairs, vertices },
-        ResponseError::NotFinite { name, vertex } => {
-            Failure::Alarm(Alarm { reason: format!("{name} not finite"), vertices: vec![vertex as u32] })
-        }
-        ResponseError::Detect(DetectError::Device { reason, .. }) => Failure::Device(reason),
-        other => Failure::Stop(stage("contact", &other)),
     }
 }
 

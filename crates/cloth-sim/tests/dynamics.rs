@@ -262,7 +262,8 @@ fn scenes_of_the_examples_folder_are_read() {
     let mut count = 0;
     for entry in std::fs::read_dir(&folder).unwrap() {
         let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "toml") {
+        // A sweep is many scenes: its own tests read it.
+        if path.extension().is_some_and(|e| e == "toml") && !path.ends_with("sweep.toml") {
             let text = std::fs::read_to_string(&path).unwrap();
             let scene =
                 Scene::parse_toml(&text, &path.display().to_string()).unwrap_or_else(|e| panic!("{e}"));

@@ -15,7 +15,7 @@ fn crumple(n: usize) -> String {
         r#"
 duration = 1.0
 [time]
-dt = 0.004
+dt = 0.01
 [contact]
 thickness = 0.006
 friction = 0.4

@@ -18,6 +18,7 @@ _ENERGIES = {
     "total": "#343230", "kinetic": "#9c2f35", "gravity": "#2f5d8c", "stretch": "#c08a2e", "shear": "#3f7a57",
     "bending": "#7a5195",
 }  # fmt: skip
+_WORKS = {"pins": "#8d8a84", "air": "#5aa0a8"}
 _STAGES = ("#2f5d8c", "#9c2f35", "#c08a2e", "#3f7a57", "#7a5195", "#8d8a84", "#5aa0a8", "#c46f9b", "#a8a03c")
 
 
@@ -71,6 +72,11 @@ def _energies(axis: Any, times: Any, frames: list[dict[str, Any]]) -> None:
             continue
         label = f"{kind} (change)" if kind in ("gravity", "total") else kind
         axis.plot(times, values, color=colour, linewidth=2.2 if kind == "total" else 1.5, label=label)
+    if len(frames) > 1 and all(frame.get("work") for frame in frames[1:]):
+        for kind, colour in _WORKS.items():
+            done = np.cumsum([frame["work"][kind] if k else 0.0 for k, frame in enumerate(frames)])
+            if np.any(done):
+                axis.plot(times, done, color=colour, linewidth=1.5, linestyle="--", label=f"work of {kind} (sum)")
     axis.set_ylabel("energy [J]", color=_INK)
 
 

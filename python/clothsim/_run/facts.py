@@ -41,6 +41,7 @@ class FrameFacts:
             "frame": frame,
             "time": self._simulation.time,
             "energy": self._simulation.energy,
+            "work": _work(steps),
             "steps": len(steps),
             "substeps": sum(step["substeps"] for step in steps),
             "retries": sum(step["retries"] for step in steps),
@@ -51,6 +52,14 @@ class FrameFacts:
             "intersections": steps[-1]["intersections"] if steps else None,
             "seconds": _seconds(steps),
         }
+
+
+def _work(steps: list[dict[str, Any]]) -> dict[str, float] | None:
+    """Work of pins and of air on the cloth [J]; None unless it is known of every step."""
+    entries = [step["energy"] for step in steps]
+    if not entries or None in entries:
+        return None
+    return {kind: sum(entry[kind] for entry in entries) for kind in ("pins", "air")}
 
 
 def _contact(steps: list[dict[str, Any]]) -> dict[str, Any] | None:

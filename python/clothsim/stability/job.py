@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import tempfile
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from clothsim.simulation import progress_bar
 from clothsim.stability import outputs as files
@@ -17,6 +14,7 @@ from clothsim.stability.atlas import Atlas, Cell, Map, Request, engine_digest
 from clothsim.study import machine
 from clothsim.study.folder import StudyFolder, fingerprint
 from clothsim.study.pool import Job, run_jobs
+from clothsim.study.work import kept
 
 __all__ = ["LIMIT", "AtlasFolder", "run"]
 
@@ -30,6 +28,7 @@ class AtlasFolder(StudyFolder):
     noun, article = "atlas", "an"
     outputs = files.FILES
     facts_file = files.FACTS
+    strangers: ClassVar[dict[str, str]] = {StudyFolder.facts_file: "a study"}
 
 
 def run(
@@ -52,30 +51,17 @@ def run(
     """
     started = time.monotonic()
     cells, digest = request.cells(), request.digest
-    with _folder(out) as folder:
-        if out is not None:
-            files.check_packages()
-            complete = folder.begin(digest, resume=resume, overwrite=overwrite)
-            if complete is not None:
-                return complete
-        with folder.locked():
-            folder.claim(digest, overwrite=overwrite)
-            where = machine.facts()
-            seen = _seen(request, cells, folder, processes, limit, progress=progress)
-            atlas = Atlas(_maps(request, seen), where, command, digest, time.monotonic() - started)
-            if out is not None:
-                files.write(atlas, out)
-                folder.remove_work()
-    return atlas
 
+    def make(folder: AtlasFolder) -> Atlas:
+        where = machine.facts()
+        seen = _seen(request, cells, folder, processes, limit, progress=progress)
+        return Atlas(_maps(request, seen), where, command, digest, time.monotonic() - started)
 
-@contextlib.contextmanager
-def _folder(out: Path | None) -> Iterator[AtlasFolder]:
-    if out is not None:
-        yield AtlasFolder(out)
-        return
-    with tempfile.TemporaryDirectory(prefix="clothsim-stability-") as name:
-        yield AtlasFolder(Path(name))
+    def write(atlas: Atlas, out: Path) -> Atlas:
+        files.write(atlas, out)
+        return atlas
+
+    return kept(AtlasFolder, out, digest, make, write, check=files.check_packages, resume=resume, overwrite=overwrite)
 
 
 def _seen(

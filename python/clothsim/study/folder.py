@@ -10,7 +10,7 @@ import hashlib
 import json
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from clothsim._files import write_whole
 from clothsim._run.folder import RunFolder
@@ -39,11 +39,14 @@ class StudyFolder(RunFolder):
         What may be written into it.
     facts_file : str
         The one of them that is written last and has the digest.
+    strangers : dict
+        Files that say that the folder holds something else, and what.
     """
 
     noun, article = "study", "a"
     outputs: tuple[str, ...] = (*OUTPUTS, "tuned.toml", "tune.json")
     facts_file = "study.json"
+    strangers: ClassVar[dict[str, str]] = {"stability.json": "an atlas"}
 
     def present(self) -> list[str]:
         """Outputs that are there."""
@@ -64,6 +67,8 @@ class StudyFolder(RunFolder):
         runs = RunFolder(self.out).present()
         if runs or (self.holds_work and not self._digest_file.exists()):
             raise OutputExists(f"{self.out}: holds a run of a scene; choose another folder")
+        if stranger := next((what for name, what in self.strangers.items() if (self.out / name).exists()), None):
+            raise OutputExists(f"{self.out}: holds {stranger}; choose another folder")
         noun = self.noun
         if overwrite:
             return None

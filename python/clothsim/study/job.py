@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import json
 import math
-import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,13 +21,14 @@ from clothsim.study.axes import RUN_AXES, Axis, apply, axis, value_text
 from clothsim.study.closed_forms import ClosedForm, find
 from clothsim.study.folder import StudyFolder, fingerprint
 from clothsim.study.metrics import Metric, metrics
-from clothsim.study.points import Settings, check_values, product
+from clothsim.study.points import Settings, check_each, check_values, product
 from clothsim.study.reference import Reference, by_refinement, exact, failed
 from clothsim.study.resolution import counted
 from clothsim.study.result import COSTS, Study
 from clothsim.study.runner import Run, Runner
+from clothsim.study.work import kept
 
-__all__ = ["Request", "based", "run", "study_folder"]
+__all__ = ["Request", "based", "run"]
 
 _REFERENCES = ("auto", "closed-form", "finest")
 
@@ -77,6 +76,7 @@ class Request:
         self.axes = [
             axis(a.name, [counted(self.base, v) for v in a.values]) if a.key == "resolution" else a for a in axes
         ]
+        check_each(self.base, self.axes)
         self.points = product(self.axes, sample, seed)
         names = [metric] if isinstance(metric, str) else list(metric or (["drape"] if seeds > 1 else ["rms"]))
         self.metrics = metrics(names)
@@ -143,30 +143,15 @@ def run(
     """Run a study into a folder; returns the facts of one that was complete already."""
     started = time.monotonic()
     digest = request.digest
-    with study_folder(out) as folder:
-        if out is not None:
-            outputs.check_packages()
-            complete = folder.begin(digest, resume=resume, overwrite=overwrite)
-            if complete is not None:
-                return complete
-        with folder.locked():
-            folder.claim(digest, overwrite=overwrite)
-            study = _measured(request, folder, processes, limit, progress=progress)
-            study = replace(study, command=command, digest=digest, out=out, seconds=time.monotonic() - started)
-            if out is not None:
-                study = replace(study, files=outputs.write(study, out))
-                folder.remove_work()
-    return study
 
+    def make(folder: StudyFolder) -> Study:
+        study = _measured(request, folder, processes, limit, progress=progress)
+        return replace(study, command=command, digest=digest, out=out, seconds=time.monotonic() - started)
 
-@contextlib.contextmanager
-def study_folder(out: Path | None) -> Iterator[StudyFolder]:
-    """Give the folder, or one that goes when the study is over."""
-    if out is not None:
-        yield StudyFolder(out)
-        return
-    with tempfile.TemporaryDirectory(prefix="clothsim-study-") as name:
-        yield StudyFolder(Path(name))
+    def write(study: Study, out: Path) -> Study:
+        return replace(study, files=outputs.write(study, out))
+
+    return kept(StudyFolder, out, digest, make, write, check=outputs.check_packages, resume=resume, overwrite=overwrite)
 
 
 def _measured(

@@ -17,7 +17,7 @@ from clothsim._device import DEVICES, GPU_METHODS, check_threads
 from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.study.axes import Axis, apply, value_text
 
-__all__ = ["Settings", "build", "check_values", "label", "product"]
+__all__ = ["Settings", "build", "check_each", "check_values", "label", "product"]
 
 # Name of an axis and its value, for every axis.
 Settings = dict[str, Any]
@@ -129,6 +129,21 @@ def _one_of(name: str, value: Any, known: Sequence[str]) -> str:
             f'{name}: expected {expected}, got "{value_text(value)}"{hint}', name=name, expected=expected
         )
     return str(value)
+
+
+def check_each(base: Mapping[str, Any], axes: Sequence[Axis]) -> None:
+    """Refuse a text that is no value of its axis, whatever else is asked.
+
+    Raises
+    ------
+    InvalidInput
+        With the scene's own words, which name the nearest known value.
+    """
+    for axis in axes:
+        for value in axis.values:
+            error = build(base, [axis], {axis.name: value}).error if isinstance(value, str) else None
+            if error is not None and f'"{value}"' in error:
+                raise InvalidInput(f"axis {axis.name} = {value}: {error}", name=axis.name, got=value)
 
 
 def check_values(base: Mapping[str, Any], axes: Sequence[Axis], points: Sequence[Settings]) -> None:

@@ -16,12 +16,13 @@ from clothsim.scene import Scene
 from clothsim.study import evaluate, machine, outputs
 from clothsim.study.axes import RUN_AXES, Axis, apply, axis, variant
 from clothsim.study.folder import StudyFolder, fingerprint
-from clothsim.study.job import Request, based, study_folder
+from clothsim.study.job import Request, based
 from clothsim.study.points import label
 from clothsim.study.quantities import amount
 from clothsim.study.result import COSTS, Row, Study
 from clothsim.study.runner import Runner
 from clothsim.study.search import SHARE, Goal, Search, look, own_error
+from clothsim.study.work import kept
 
 __all__ = ["Goal", "Tuned", "tune"]
 
@@ -121,35 +122,36 @@ def tune(
         raise InvalidInput(f"cost: expected seconds or cpu_seconds for a budget, got {cost}", name="cost", got=cost)
     digest = fingerprint([request.digest, goal.error, goal.budget, goal.per])
     where = machine.facts()
-    with study_folder(out) as folder:
-        if out is not None:
-            outputs.check_packages()
-            if folder.begin(digest, resume=resume, overwrite=overwrite) is not None:
-                raise OutputExists(f"{out}: holds these settings already; --overwrite finds them anew")
-        with folder.locked():
-            folder.claim(digest, overwrite=overwrite)
-            runner = Runner(
-                scene, request.base, request.axes, folder, repeats=repeats, patience=patience, processes=processes,
-                limit=limit,
-            )  # fmt: skip
-            bar = progress_bar(0, enabled=progress, name="runs")
-            bar.unit = "run"
-            try:
-                search = Search(request, runner, goal, bar.update)
-                look(search)
-                best = search.best()
-                row, again, made = _confirmed(search, best, scene, request, out)
-            finally:
-                bar.close()
-            rows = sorted(search.rows.values(), key=lambda r: [str(v) for v in r.settings.values()])
-            study = evaluate.study(request, rows, [({}, search.reference)], where, 1)
-            study = replace(study, command=command, digest=digest, out=out, seconds=time.monotonic() - started)
-            met = again is not None and search.meets(again)
-            statement = _statement(search, row, again, met=met)
-            found = Tuned(goal, row, again, met, made, study, statement, search.frames)
-            if out is not None:
-                found = replace(found, files=_write(found, out))
-                folder.remove_work()
+
+    def make(folder: StudyFolder) -> Tuned:
+        runner = Runner(
+            scene, request.base, request.axes, folder, repeats=repeats, patience=patience, processes=processes,
+            limit=limit,
+        )  # fmt: skip
+        bar = progress_bar(0, enabled=progress, name="runs")
+        bar.unit = "run"
+        try:
+            search = Search(request, runner, goal, bar.update)
+            look(search)
+            best = search.best()
+            row, again, made = _confirmed(search, best, scene, request, out)
+        finally:
+            bar.close()
+        rows = sorted(search.rows.values(), key=lambda r: [str(v) for v in r.settings.values()])
+        study = evaluate.study(request, rows, [({}, search.reference)], where, 1)
+        study = replace(study, command=command, digest=digest, out=out, seconds=time.monotonic() - started)
+        met = again is not None and search.meets(again)
+        statement = _statement(search, row, again, met=met)
+        return Tuned(goal, row, again, met, made, study, statement, search.frames)
+
+    def write(found: Tuned, out: Path) -> Tuned:
+        return replace(found, files=_write(found, out))
+
+    found = kept(
+        StudyFolder, out, digest, make, write, check=outputs.check_packages, resume=resume, overwrite=overwrite
+    )
+    if not isinstance(found, Tuned):
+        raise OutputExists(f"{out}: holds these settings already; --overwrite finds them anew")
     return found
 
 

@@ -6,7 +6,10 @@ use rayon::prelude::*;
 
 use super::{ELEMENTS_PER_CHUNK, ForceClock, timed};
 use crate::{
-    forces::{Block, CouplingKind, Couplings, ForceModel, Linear, Outer, Psd, Survey, corner_pairs},
+    forces::{
+        Block, CouplingKind, Couplings, ForceModel, Linear, Outer, Psd, Survey, corner_pairs,
+        memory::{Memory, chunks_mut},
+    },
     mesh::Vec3,
 };
 
@@ -25,26 +28,12 @@ pub(crate) struct Corners {
     pub(crate) clock: ForceClock,
 }
 
-/// The memory of a range of a model's `count` elements.
-pub(crate) fn part(memory: &[f64], count: usize, range: Range<usize>) -> &[f64] {
-    let words = memory.len() / count.max(1);
-    &memory[words * range.start..words * range.end]
-}
-
 /// The survey of a model, for the elements of a range.
 pub(crate) fn surveyed(survey: &Survey<Vec<f64>>, range: Range<usize>) -> Survey<&[f64]> {
     if survey.work.is_empty() {
         return Survey::default();
     }
     Survey { elastic: &survey.elastic, work: &survey.work[range] }
-}
-
-/// The memory of each chunk of a model's `count` elements; empty parts for a law without memory.
-pub(crate) fn parts_mut(memory: &mut [f64], count: usize) -> Vec<&mut [f64]> {
-    if memory.is_empty() {
-        return (0..count.div_ceil(ELEMENTS_PER_CHUNK)).map(|_| &mut [][..]).collect();
-    }
-    memory.chunks_mut(memory.len() / count * ELEMENTS_PER_CHUNK).collect()
 }
 
 impl Survey<Vec<f64>> {
@@ -55,14 +44,14 @@ impl Survey<Vec<f64>> {
     }
 
     /// Looks at all elements; nothing for a model whose elements stand alone.
-    pub(crate) fn take(&mut self, model: &dyn ForceModel, memory: &[f64], x: &[Vec3]) {
+    pub(crate) fn take(&mut self, model: &dyn ForceModel, memory: &Memory, x: &[Vec3]) {
         let count = self.work.len();
         let parts = self.elastic.par_chunks_mut(ELEMENTS_PER_CHUNK);
         parts.zip(self.work.par_chunks_mut(ELEMENTS_PER_CHUNK)).enumerate().for_each(
             |(chunk, (elastic, work))| {
                 let start = chunk * ELEMENTS_PER_CHUNK;
                 let range = start..start + work.len();
-                model.survey(range.clone(), x, part(memory, count, range), Survey { elastic, work });
+                model.survey(range.clone(), x, memory.part(count, range), Survey { elastic, work });
             },
         );
     }
@@ -81,7 +70,7 @@ impl Corners {
     pub(crate) fn evaluate(
         &mut self,
         models: &[Box<dyn ForceModel>],
-        memory: &[Vec<f64>],
+        memory: &[Memory],
         x: &[Vec3],
         v: &[Vec3],
     ) {
@@ -97,7 +86,7 @@ impl Corners {
                 mine.par_chunks_mut(ELEMENTS_PER_CHUNK * corners).enumerate().for_each(|(chunk, out)| {
                     let start = chunk * ELEMENTS_PER_CHUNK;
                     let range = start..start + out.len() / corners;
-                    let memory = part(memory, model.count(), range.clone());
+                    let memory = memory.part(model.count(), range.clone());
                     model.forces(range.clone(), x, v, memory, surveyed(survey, range), out);
                 });
             });
@@ -126,7 +115,7 @@ impl ElementBuffers {
     pub(crate) fn linearise(
         &mut self,
         models: &[Box<dyn ForceModel>],
-        memory: &mut [Vec<f64>],
+        memory: &mut [Memory],
         corners: &mut Corners,
         x: &[Vec3],
         v: &[Vec3],
@@ -156,17 +145,20 @@ impl ElementBuffers {
             }
             timed(seconds, || {
                 let count = model.count();
-                let first = parts_mut(memory, count)
+                let mut room = memory.room(count);
+                let first = memory
+                    .chunks_mut(count, &mut room)
                     .into_par_iter()
-                    .zip(parts_mut(&mut survey.elastic, count))
-                    .zip(parts_mut(&mut survey.work, count));
+                    .zip(chunks_mut(&mut survey.elastic, count))
+                    .zip(chunks_mut(&mut survey.work, count));
                 parts.each(kind, f, n, first, |range, f, ((memory, elastic), work), couplings| {
                     model.linearise(range, x, v, linear, memory, Survey { elastic, work }, f, couplings);
                 });
+                memory.take(&room);
                 if !survey.work.is_empty() {
                     let (memory, survey) = (&*memory, &*survey);
                     parts.each(kind, f, n, chunks(count), |range, f, (), couplings| {
-                        let memory = part(memory, count, range.clone());
+                        let memory = memory.part(count, range.clone());
                         let survey = surveyed(survey, range.clone());
                         model.couple(range, x, v, linear, memory, survey, f, couplings);
                     });

@@ -17,7 +17,7 @@ pub(crate) mod simd;
 
 pub(crate) use block_csr::{BlockMatrix, Lanes};
 pub(crate) use clock::{ForceClock, timed};
-pub(crate) use elements::{Corners, ElementBuffers, part, parts_mut, surveyed};
+pub(crate) use elements::{Corners, ElementBuffers, surveyed};
 pub(crate) use gather::Assembler;
 pub(crate) use pattern::Pattern;
 pub(crate) use projection::{Freedom, Projection};

@@ -21,6 +21,12 @@
 //! held in that moment: K drops by what the rest curvature gains, and u moves as much as m/M_0, so that λ = 1 and a
 //! complete recovery leave an unused place about the new rest curvature. Where friction shrinks below |m|, m goes with it.
 //!
+//! A loop has no elastic range, but a small one while |K| ≤ ρ K_0 on every path so far. There a = (1 − m/M_0)/(1 − u)² and
+//! d = (1 + m/M_0)/(1 + u)², of which a motion upward keeps a and one downward d, stay in [1/(1 + ρ), 1/(1 − ρ)]: at the ends of that
+//! range the best that a turn can do for one is to put the other back where it was. Hence m is nowhere farther from the first loading
+//! than 2 ρ/(2 + ρ) M_0. Later motions along the same curvatures only bring the two closer together, so a place that is
+//! taken as unused until it leaves the range has its moment right to that share of M_0 for ever.
+//!
 //! Source: thesis 4.3.2–4.3.5.
 
 #![allow(clippy::inline_always, reason = "measured: a call per hinge costs a third of the kernel")]
@@ -328,6 +334,18 @@ impl BendingLaw for Hysteresis {
         }
         *place = end;
         work
+    }
+
+    /// Beyond ρ K_0 with 2 ρ/(2 + ρ) = `neglected`; never without a loop.
+    #[inline(always)]
+    fn leaves(&self, curvature: f64, neglected: f64) -> bool {
+        self.m0 > 0.0 && curvature.abs() > 2.0 * neglected / (2.0 - neglected) * self.k0
+    }
+
+    /// The curve of first loading, there and back.
+    #[inline(always)]
+    fn fresh(&self, curvature: f64, rate: f64) -> Moment {
+        BendingLaw::moment(&self.curve, &(), curvature, rate)
     }
 
     fn place(&self, place: &Loop) -> Place {

@@ -95,6 +95,12 @@ impl BendingLaw for Plastic {
         after - before + self.limit_moment() * flow.abs()
     }
 
+    /// Below the limit the path does nothing, whatever may be neglected.
+    #[inline]
+    fn leaves(&self, curvature: f64, _neglected: f64) -> bool {
+        self.flow(&Flow::default(), curvature) != 0.0
+    }
+
     fn place(&self, place: &Flow) -> Place {
         Place { rest_curvature: place.plastic, b1: self.rigidity, frictional_moment: self.limit_moment() }
     }

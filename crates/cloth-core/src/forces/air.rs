@@ -11,7 +11,10 @@
 
 use std::ops::Range;
 
-use super::{CouplingKind, Couplings, ForceModel, Linear, Psd, Survey};
+use super::{
+    CouplingKind, Couplings, ForceModel, Linear, Psd, Survey,
+    memory::{Past, PastMut},
+};
 use crate::{EffectInfo, Energy, mesh::Vec3};
 
 /// Drag and lift on the triangles of all cloth.
@@ -65,6 +68,10 @@ impl ForceModel for Air {
         CouplingKind::Diagonal
     }
 
+    fn is_air(&self) -> bool {
+        true
+    }
+
     fn dissipates(&self) -> bool {
         true
     }
@@ -73,7 +80,7 @@ impl ForceModel for Air {
         &self,
         _range: Range<usize>,
         _x: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         _energy: &mut Energy,
     ) {
@@ -84,7 +91,7 @@ impl ForceModel for Air {
         range: Range<usize>,
         x: &[Vec3],
         v: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         out: &mut [Vec3],
     ) {
@@ -99,7 +106,7 @@ impl ForceModel for Air {
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
-        _memory: &mut [f64],
+        _memory: PastMut<'_>,
         _survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,

@@ -144,6 +144,7 @@ mod tests {
     use super::super::{
         Linear, Psd,
         hinge::Hinges,
+        memory::Memory,
         testing::{
             Model, Random, check_force, check_momentum, check_rigid_motion, check_velocity_terms, energy,
             force_by_differences, forces, linearised,
@@ -408,7 +409,7 @@ mod tests {
         let models = std::slice::from_ref(&coupled.law);
         let (mut assembler, _) = crate::assembly::Assembler::new(n, models, Psd::Projected);
         let mut corners = crate::assembly::Corners::new(models);
-        assembler.elements.linearise(models, &mut [Vec::new()], &mut corners, x, &rest, &projected);
+        assembler.elements.linearise(models, &mut [Memory::default()], &mut corners, x, &rest, &projected);
         let d = Random::new(4).vectors(n, 1.0);
         let mut beyond = rest.clone();
         assembler.elements.add_beyond(models, &d, &mut beyond);

@@ -9,6 +9,9 @@
 //! E = |e| B (θ − θ_0)²/(2 h̄) and makes B the rigidity that a textile laboratory measures.
 //!
 //! Angles of laws with memory go on past ±π: of the angles that differ by 2π, the one next to what is remembered counts.
+//! Where hinges remember only once they have left the elastic range ([`ForceModel::remember_beyond`]), the others answer as unused
+//! places do, and the angle next to the one at rest counts: the same but for a hinge that turns from less than [`OPEN`] to past ±π
+//! within one step.
 //!
 //! Torque |e| M, force −|e| M dθ/dx with the exact gradient (t_i = l_i·e/|e|²):
 //! dθ/dx_2 = −|e| n_0/|n_0|², dθ/dx_3 = −|e| n_1/|n_1|², dθ/dx_0 = −(1 − t_0) dθ/dx_2 − (1 − t_1) dθ/dx_3,
@@ -31,22 +34,32 @@
 
 use std::{f64::consts::PI, ops::Range};
 
+mod exact;
+mod kernels;
+mod places;
+
 use super::{
-    CouplingKind, Couplings, ForceModel, Psd, Survey, corner_pairs,
+    CouplingKind, Couplings, ForceModel, Psd, Survey,
     coupled::{Coupled, Plate},
+    memory::{Memory, Past, PastMut},
 };
 use crate::{
     CoreError, EffectInfo, Energy,
-    bending::{BendingLaw, HingeState, words},
+    bending::{BendingLaw, HingeState, Moment, words},
     forces::Outer,
     mesh::Vec3,
 };
+use places::{All, Few, Growing, Places, PlacesMut};
 
 /// Area relative to rest under which a triangle's normal no longer gives a full gradient.
 const COLLAPSED: f64 = 1e-4;
 
 /// Hinges whose angles are computed before their laws.
 const BLOCK: usize = 32;
+
+/// Largest change of its angle at which a hinge without history stays without [rad]: far from ±π, past which history tells turns
+/// apart.
+const OPEN: f64 = PI / 4.0;
 
 /// Hinges with one law.
 pub(crate) struct Hinges<L: BendingLaw> {
@@ -56,6 +69,8 @@ pub(crate) struct Hinges<L: BendingLaw> {
     vertices: Vec<[u32; 4]>,
     rest: Vec<Rest>,
     coupled: Option<Coupled>,
+    /// Of hinges that remember only beyond the elastic range: what may be neglected there, see [`BendingLaw::leaves`].
+    lean: Option<f64>,
 }
 
 /// Rest data of one hinge.
@@ -86,7 +101,7 @@ struct Angle {
     gradient: [Vec3; 4],
 }
 
-/// What the elements of a range remember; empty for laws without memory.
+/// Numbers as places; none for laws without memory.
 fn places<L: BendingLaw>(memory: &[f64]) -> &[L::Memory] {
     if words::<L>() == 0 { &[] } else { bytemuck::cast_slice(memory) }
 }
@@ -96,10 +111,37 @@ fn places_mut<L: BendingLaw>(memory: &mut [f64]) -> &mut [L::Memory] {
     if words::<L>() == 0 { &mut [] } else { bytemuck::cast_slice_mut(memory) }
 }
 
-/// What the element `k` of a range remembers.
-#[inline(always)]
-fn place<L: BendingLaw>(places: &[L::Memory], k: usize) -> L::Memory {
-    if words::<L>() == 0 { L::Memory::default() } else { places[k] }
+/// Runs a kernel with the places of a range of hinges that begins at `first`, in the way in which they are kept.
+macro_rules! with_places {
+    ($memory:expr, $first:expr, |$places:ident| $kernel:expr) => {
+        match $memory {
+            Past::Dense(memory) => {
+                let $places = &mut All(places::<L>(memory));
+                $kernel
+            }
+            Past::Sparse(elements, memory) => {
+                let $places = &mut Few::new($first, elements, places::<L>(memory));
+                $kernel
+            }
+        }
+    };
+}
+
+/// As [`with_places`], with places that can be moved on.
+macro_rules! with_places_mut {
+    ($memory:expr, $first:expr, |$places:ident| $kernel:expr) => {
+        match $memory {
+            PastMut::Dense(memory) => {
+                let $places = &mut All(places_mut::<L>(memory));
+                $kernel
+            }
+            PastMut::Sparse { elements, numbers, found } => {
+                let few = Few::new($first, elements, places_mut::<L>(numbers));
+                let $places = &mut Growing { few, found };
+                $kernel
+            }
+        }
+    };
 }
 
 /// Signed dihedral angle [rad] of corners (e0, e1, opposite, opposite).
@@ -129,7 +171,7 @@ impl<L: BendingLaw> Hinges<L> {
                 }
             }
         }
-        Ok(Self { law, damping, vertices, rest, coupled: None })
+        Ok(Self { law, damping, vertices, rest, coupled: None, lean: None })
     }
 
     /// The same hinges, coupled over these triangles.
@@ -140,9 +182,9 @@ impl<L: BendingLaw> Hinges<L> {
 
     /// Change of curvature of a hinge whose angle is `angle` ∈ [−π, π].
     #[inline(always)]
-    fn curvature(rest: &Rest, memory: &L::Memory, angle: f64) -> f64 {
+    fn curvature(rest: &Rest, place: Option<&L::Memory>, angle: f64) -> f64 {
         let curvature = (angle - rest.angle) / rest.height;
-        match L::last(memory) {
+        match place.map_or_else(|| L::last(&L::Memory::default()), L::last) {
             Some(last) if (last - curvature).abs() * rest.height > PI => {
                 let turn = 2.0 * PI / rest.height;
                 curvature + turn * ((last - curvature) / turn).round()
@@ -186,25 +228,50 @@ impl<L: BendingLaw> Hinges<L> {
         Angle { value, gradient: Self::gradient_of(rest, [e, l0, l1, n0, n1], e2, length) }
     }
 
+    /// What the law answers at a curvature; `None`: at a place without history.
+    #[inline(always)]
+    fn answer(&self, place: Option<&L::Memory>, curvature: f64, rate: f64) -> Moment {
+        match place {
+            Some(place) => self.law.moment(place, curvature, rate),
+            None => self.law.fresh(curvature, rate),
+        }
+    }
+
+    /// K_e at a curvature [1/m].
+    #[inline(always)]
+    fn elastic(&self, place: Option<&L::Memory>, curvature: f64) -> f64 {
+        match place {
+            Some(place) => self.law.elastic(place, curvature),
+            None => self.law.elastic(&L::Memory::default(), curvature),
+        }
+    }
+
     /// Place and curvature at the angle `value` of the element `k` of a range; `accept` moves its memory on to there.
     #[inline(always)]
     fn arrive(
         &self,
         rest: &Rest,
-        places: &mut [L::Memory],
+        places: &mut impl PlacesMut<L>,
         k: usize,
         value: f64,
         accept: bool,
-    ) -> (L::Memory, f64) {
-        let mut place = place::<L>(places, k);
-        let curvature = Self::curvature(rest, &place, value);
-        if accept {
-            self.law.advance(&mut place, curvature);
-            if words::<L>() > 0 {
-                places[k] = place;
-            }
+    ) -> (Option<L::Memory>, f64) {
+        let place = places.get(k);
+        let curvature = Self::curvature(rest, place.as_ref(), value);
+        if !accept || (place.is_none() && self.stays(rest, curvature)) {
+            return (place, curvature);
         }
-        (place, curvature)
+        let mut place = place.unwrap_or_default();
+        self.law.advance(&mut place, curvature);
+        places.put(k, place);
+        (Some(place), curvature)
+    }
+
+    /// Whether a hinge without history needs none at a curvature either.
+    #[inline(always)]
+    fn stays(&self, rest: &Rest, curvature: f64) -> bool {
+        let neglected = self.lean.unwrap_or(0.0);
+        curvature.abs() * rest.height <= OPEN && !self.law.leaves(curvature, neglected)
     }
 
     /// Torque of its neighbours on an element [N m].
@@ -218,74 +285,6 @@ impl<L: BendingLaw> Hinges<L> {
     fn bound(&self, element: usize, iterates: bool) -> f64 {
         self.coupled.as_ref().map_or(0.0, |coupled| coupled.bounds(iterates)[element])
     }
-
-    /// Corner forces and exact blocks of an element at a curvature; `neighbours`: their torque [N m].
-    #[inline]
-    fn exact_blocks(
-        &self,
-        element: usize,
-        x: &[Vec3],
-        v: &[Vec3],
-        linear: &super::Linear,
-        (place, curvature, neighbours): (L::Memory, f64, f64),
-        f: &mut [Vec3],
-        blocks: &mut [super::Block],
-    ) {
-        let rest = &self.rest[element];
-        let (corners, velocity) = (self.corners_of(element, x), self.corners_of(element, v));
-        let gradient = Self::gradient(rest, &corners);
-        let rate: f64 = (0..4).map(|c| gradient[c].dot(&velocity[c])).sum();
-        let answer = self.law.moment(&place, curvature, rate);
-        let per_angle = rest.edge / rest.height;
-        let stiffness = per_angle * answer.slope + self.bound(element, linear.iterates);
-        let damping = per_angle * self.damping;
-        let moment = rest.edge * answer.moment + neighbours;
-        let torque = moment + (damping + linear.ahead * stiffness) * rate;
-        let change = Self::gradient_change(rest, &corners, &velocity);
-        for c in 0..4 {
-            f[c] = gradient[c] * -torque - change[c] * (linear.ahead * moment);
-        }
-        let scale = linear.stiffness * stiffness + linear.damping * damping;
-        for b in 0..4 {
-            for axis in 0..3 {
-                let mut direction = [Vec3::zeros(); 4];
-                direction[b][axis] = 1.0;
-                let change = Self::gradient_change(rest, &corners, &direction);
-                for (p, &(row, column)) in corner_pairs(4).iter().enumerate() {
-                    if column == b {
-                        let entry = gradient[row] * (scale * gradient[b][axis])
-                            + change[row] * (linear.stiffness * moment);
-                        blocks[p][3 * axis..3 * axis + 3].copy_from_slice(entry.as_slice());
-                    }
-                }
-            }
-        }
-    }
-
-    /// dθ/dx's change along corner motions `d`: the exact second derivative of θ applied to `d`.
-    fn gradient_change(rest: &Rest, x: &[Vec3; 4], d: &[Vec3; 4]) -> [Vec3; 4] {
-        let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
-        let (de, dl0, dl1) = (d[1] - d[0], d[2] - d[0], d[3] - d[0]);
-        let (n0, n1) = (e.cross(&l0), l1.cross(&e));
-        let (dn0, dn1) = (de.cross(&l0) + e.cross(&dl0), dl1.cross(&e) + l1.cross(&de));
-        let e2 = e.norm_squared().max(rest.edge * rest.edge * COLLAPSED * COLLAPSED);
-        let length = e2.sqrt();
-        let dlength = e.dot(&de) / length;
-        let flap = |n: &Vec3, dn: &Vec3, floor: f64| {
-            let n2 = n.norm_squared().max(floor);
-            let g = n * (-length / n2);
-            let dg = -(n * dlength + dn * length) / n2 + n * (2.0 * length * n.dot(dn) / (n2 * n2));
-            (g, dg)
-        };
-        let ((g2, dg2), (g3, dg3)) = (flap(&n0, &dn0, rest.floor[0]), flap(&n1, &dn1, rest.floor[1]));
-        let ratio = |l: &Vec3, dl: &Vec3| {
-            let t = l.dot(&e) / e2;
-            (t, (dl.dot(&e) + l.dot(&de) - 2.0 * t * e.dot(&de)) / e2)
-        };
-        let ((t0, dt0), (t1, dt1)) = (ratio(&l0, &dl0), ratio(&l1, &dl1));
-        let dg1 = -(g2 * dt0 + dg2 * t0 + g3 * dt1 + dg3 * t1);
-        [-(dg1 + dg2 + dg3), dg1, dg2, dg3]
-    }
 }
 
 impl<L: BendingLaw> ForceModel for Hinges<L> {
@@ -295,7 +294,7 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
             elements: self.vertices.len(),
             bytes: size_of_val(self.vertices.as_slice())
                 + size_of_val(self.rest.as_slice())
-                + size_of::<L::Memory>() * self.vertices.len(),
+                + if self.lean.is_some() { 0 } else { size_of::<L::Memory>() * self.vertices.len() },
         }
     }
 
@@ -326,27 +325,42 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         self.law.stiffening()
     }
 
-    fn unused(&self) -> Vec<f64> {
+    fn remember_beyond(&mut self, neglected: f64) {
+        if words::<L>() > 0 {
+            self.lean = Some(neglected);
+        }
+    }
+
+    fn unused(&self) -> Memory {
+        if words::<L>() == 0 {
+            return Memory::default();
+        }
+        if self.lean.is_some() {
+            return Memory::sparse(words::<L>());
+        }
+        Memory::Dense(bytemuck::cast_slice(&vec![L::Memory::default(); self.vertices.len()]).to_vec())
+    }
+
+    fn accept(&self, range: Range<usize>, x: &[Vec3], memory: PastMut<'_>) {
+        with_places_mut!(memory, range.start, |places| self.advance(range, x, places));
+    }
+
+    fn hinge_states(&self, x: &[Vec3], memory: &Memory) -> Vec<HingeState> {
         if words::<L>() == 0 {
             return Vec::new();
         }
-        bytemuck::cast_slice(&vec![L::Memory::default(); self.vertices.len()]).to_vec()
-    }
-
-    fn accept(&self, range: Range<usize>, x: &[Vec3], memory: &mut [f64]) {
-        for (element, place) in range.zip(places_mut::<L>(memory)) {
-            let angle = dihedral_angle(&self.corners_of(element, x));
-            self.law.advance(place, Self::curvature(&self.rest[element], place, angle));
-        }
-    }
-
-    fn hinge_states(&self, memory: &[f64]) -> Vec<HingeState> {
-        let state = |(vertices, place): (&[u32; 4], &L::Memory)| {
-            let curvature = L::last(place)?;
-            let moment = self.law.moment(place, curvature, 0.0).moment;
-            Some(HingeState { vertices: *vertices, curvature, moment, place: self.law.place(place) })
+        let state = |(element, place): (usize, Option<L::Memory>)| {
+            let angle = || dihedral_angle(&self.corners_of(element, x));
+            let curvature = place.as_ref().and_then(L::last);
+            let curvature = curvature.unwrap_or_else(|| Self::curvature(&self.rest[element], None, angle()));
+            let moment = self.answer(place.as_ref(), curvature, 0.0).moment;
+            let place = self.law.place(&place.unwrap_or_default());
+            HingeState { vertices: self.vertices[element], curvature, moment, place }
         };
-        self.vertices.iter().zip(places::<L>(memory)).filter_map(state).collect()
+        let all = 0..self.vertices.len();
+        with_places!(memory.part(all.len(), all.clone()), 0, |places| {
+            all.map(|k| state((k, Places::<L>::get(places, k)))).collect()
+        })
     }
 
     fn coupled(&self) -> Option<EffectInfo> {
@@ -354,37 +368,21 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         Some(EffectInfo { name: "hinge coupling", elements: self.vertices.len(), bytes })
     }
 
-    fn survey(&self, range: Range<usize>, x: &[Vec3], memory: &[f64], survey: Survey<&mut [f64]>) {
-        let places = places::<L>(memory);
-        let out = survey.elastic.iter_mut().zip(survey.work);
-        for ((k, element), (elastic, work)) in range.enumerate().zip(out) {
-            let (rest, place) = (&self.rest[element], place::<L>(places, k));
-            *work = Self::curvature(rest, &place, dihedral_angle(&self.corners_of(element, x)));
-            *elastic = rest.height * self.law.elastic(&place, *work);
-        }
+    fn survey(&self, range: Range<usize>, x: &[Vec3], memory: Past<'_>, survey: Survey<&mut [f64]>) {
+        with_places!(memory, range.start, |places| self.look(range, x, places, survey));
     }
 
     fn add_energy(
         &self,
         range: Range<usize>,
         x: &[Vec3],
-        memory: &[f64],
+        memory: Past<'_>,
         survey: Survey<&[f64]>,
         energy: &mut Energy,
     ) {
-        let places = places::<L>(memory);
-        for (k, element) in range.enumerate() {
-            let (rest, place) = (&self.rest[element], place::<L>(places, k));
-            let curvature = if self.coupled.is_some() {
-                // Half of each product: its other hinge has the other half.
-                let torque = self.neighbour_torque(element, survey.elastic);
-                energy.bending += 0.5 * survey.elastic[element] * torque;
-                survey.work[k]
-            } else {
-                Self::curvature(rest, &place, dihedral_angle(&self.corners_of(element, x)))
-            };
-            energy.bending += rest.edge * rest.height * self.law.moment(&place, curvature, 0.0).energy;
-        }
+        with_places!(memory, range.start, |places| {
+            self.add_bending(range, x, places, survey, &mut energy.bending);
+        });
     }
 
     fn forces(
@@ -392,30 +390,11 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         range: Range<usize>,
         x: &[Vec3],
         v: &[Vec3],
-        memory: &[f64],
+        memory: Past<'_>,
         survey: Survey<&[f64]>,
         out: &mut [Vec3],
     ) {
-        let places = places::<L>(memory);
-        for ((k, element), f) in range.enumerate().zip(out.chunks_exact_mut(4)) {
-            let (rest, place) = (&self.rest[element], place::<L>(places, k));
-            let corners = self.corners_of(element, x);
-            let (curvature, gradient, neighbours) = if self.coupled.is_some() {
-                let neighbours = self.neighbour_torque(element, survey.elastic);
-                (survey.work[k], Self::gradient(rest, &corners), neighbours)
-            } else {
-                let Angle { value, gradient } = Self::angle(rest, &corners);
-                (Self::curvature(rest, &place, value), gradient, 0.0)
-            };
-            let mut torque = rest.edge * self.law.moment(&place, curvature, 0.0).moment + neighbours;
-            if self.damping > 0.0 {
-                let rate: f64 = (0..4).map(|c| gradient[c].dot(&v[self.vertices[element][c] as usize])).sum();
-                torque += rest.edge * self.damping / rest.height * rate;
-            }
-            for c in 0..4 {
-                f[c] = gradient[c] * -torque;
-            }
-        }
+        with_places!(memory, range.start, |places| self.push(range, x, v, places, survey, out));
     }
 
     fn linearise(
@@ -424,34 +403,27 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         x: &[Vec3],
         v: &[Vec3],
         linear: &super::Linear,
-        memory: &mut [f64],
+        memory: PastMut<'_>,
         survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {
-        let places = places_mut::<L>(memory);
         let first = range.start;
         match couplings {
             Couplings::Outer(outer) if self.coupled.is_some() => {
-                self.outer::<true>(first, x, v, linear, places, survey, forces, outer);
+                with_places_mut!(memory, first, |places| {
+                    self.outer::<true>(first, x, v, linear, places, survey, forces, outer);
+                });
             }
             Couplings::Outer(outer) => {
-                self.outer::<false>(first, x, v, linear, places, survey, forces, outer);
+                with_places_mut!(memory, first, |places| {
+                    self.outer::<false>(first, x, v, linear, places, survey, forces, outer);
+                });
             }
             Couplings::Blocks(blocks) => {
-                for ((k, element), (f, blocks)) in
-                    range.enumerate().zip(forces.chunks_exact_mut(4).zip(blocks.chunks_exact_mut(6)))
-                {
-                    let rest = &self.rest[element];
-                    let value = dihedral_angle(&self.corners_of(element, x));
-                    let (place, curvature) = self.arrive(rest, places, k, value, linear.accept);
-                    if self.coupled.is_some() {
-                        survey.elastic[k] = rest.height * self.law.elastic(&place, curvature);
-                        survey.work[k] = curvature;
-                    } else {
-                        self.exact_blocks(element, x, v, linear, (place, curvature, 0.0), f, blocks);
-                    }
-                }
+                with_places_mut!(memory, first, |places| {
+                    self.blocks(range, x, v, linear, places, survey, forces, blocks);
+                });
             }
             Couplings::Diagonal(_) => unreachable!("hinges couple by blocks, element {first}"),
         }
@@ -478,15 +450,15 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
         x: &[Vec3],
         v: &[Vec3],
         linear: &super::Linear,
-        memory: &[f64],
+        memory: Past<'_>,
         survey: Survey<&[f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
     ) {
         let first = range.start;
-        let elements = range.zip(survey.work).zip(forces.chunks_exact_mut(4));
         match couplings {
             Couplings::Outer(outer) => {
+                let elements = range.zip(survey.work).zip(forces.chunks_exact_mut(4));
                 for (((element, own), f), outer) in elements.zip(outer) {
                     let torque = own + self.neighbour_torque(element, survey.elastic);
                     for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
@@ -495,73 +467,11 @@ impl<L: BendingLaw> ForceModel for Hinges<L> {
                 }
             }
             Couplings::Blocks(blocks) => {
-                let places = places::<L>(memory);
-                for (k, (((element, curvature), f), blocks)) in
-                    elements.zip(blocks.chunks_exact_mut(6)).enumerate()
-                {
-                    let at =
-                        (place::<L>(places, k), *curvature, self.neighbour_torque(element, survey.elastic));
-                    self.exact_blocks(element, x, v, linear, at, f, blocks);
-                }
+                with_places!(memory, first, |places| {
+                    self.couple_blocks(range, x, v, linear, places, survey, forces, blocks);
+                });
             }
             Couplings::Diagonal(_) => unreachable!("hinges couple by blocks, element {first}"),
-        }
-    }
-}
-
-impl<L: BendingLaw> Hinges<L> {
-    /// Couplings and corner forces of the elements from `first` on; of coupled ones elastic angles and torques instead of
-    /// forces.
-    #[inline]
-    fn outer<const COUPLED: bool>(
-        &self,
-        first: usize,
-        x: &[Vec3],
-        v: &[Vec3],
-        linear: &super::Linear,
-        places: &mut [L::Memory],
-        Survey { elastic, work }: Survey<&mut [f64]>,
-        forces: &mut [Vec3],
-        outer: &mut [Outer],
-    ) {
-        let blocks = forces.chunks_mut(4 * BLOCK).zip(outer.chunks_mut(BLOCK));
-        for (block, (forces, outer)) in blocks.enumerate() {
-            // Angles first, laws after: the laws of several hinges then run side by side.
-            let (mut angles, mut rates) = ([0.0; BLOCK], [0.0; BLOCK]);
-            for (k, outer) in outer.iter_mut().enumerate() {
-                let element = first + block * BLOCK + k;
-                let Angle { value, gradient } =
-                    Self::angle(&self.rest[element], &self.corners_of(element, x));
-                let [v0, v1, v2, v3] = self.corners_of(element, v);
-                // Σ g_a = 0, so the rate needs differences only.
-                rates[k] =
-                    gradient[1].dot(&(v1 - v0)) + gradient[2].dot(&(v2 - v0)) + gradient[3].dot(&(v3 - v0));
-                angles[k] = value;
-                outer.gradient = gradient.map(Into::into);
-            }
-            for (k, (f, outer)) in forces.chunks_exact_mut(4).zip(outer).enumerate() {
-                let at = block * BLOCK + k;
-                let rest = &self.rest[first + at];
-                let (place, curvature) = self.arrive(rest, places, at, angles[k], linear.accept);
-                let answer = self.law.moment(&place, curvature, rates[k]);
-                let per_angle = rest.edge / rest.height;
-                // A negative slope has no place in a positive semi-definite block.
-                let mut stiffness = per_angle * answer.slope.max(0.0);
-                if COUPLED {
-                    stiffness += self.bound(first + at, linear.iterates);
-                }
-                let damping = per_angle * self.damping;
-                let torque = rest.edge * answer.moment + (damping + linear.ahead * stiffness) * rates[k];
-                if COUPLED {
-                    elastic[at] = rest.height * self.law.elastic(&place, curvature);
-                    work[at] = torque;
-                } else {
-                    for (f, gradient) in f.iter_mut().zip(&outer.gradient) {
-                        *f = Vec3::from(*gradient) * -torque;
-                    }
-                }
-                outer.scale = linear.stiffness * stiffness + linear.damping * damping;
-            }
         }
     }
 }

@@ -14,6 +14,7 @@
 pub(crate) mod air;
 pub(crate) mod coupled;
 pub(crate) mod hinge;
+pub(crate) mod memory;
 pub(crate) mod spring;
 pub(crate) mod stitch;
 pub(crate) mod stretch_shear;
@@ -26,6 +27,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use crate::{EffectInfo, Energy, bending::HingeState, mesh::Vec3};
+use memory::{Memory, Past, PastMut};
 
 /// What is done about the indefinite part of Hessian blocks.
 ///
@@ -124,7 +126,7 @@ pub(crate) trait ForceModel: Send + Sync {
         &self,
         range: Range<usize>,
         x: &[Vec3],
-        memory: &[f64],
+        memory: Past<'_>,
         survey: Survey<&[f64]>,
         energy: &mut Energy,
     );
@@ -134,7 +136,7 @@ pub(crate) trait ForceModel: Send + Sync {
         range: Range<usize>,
         x: &[Vec3],
         v: &[Vec3],
-        memory: &[f64],
+        memory: Past<'_>,
         survey: Survey<&[f64]>,
         out: &mut [Vec3],
     );
@@ -145,7 +147,7 @@ pub(crate) trait ForceModel: Send + Sync {
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
-        memory: &mut [f64],
+        memory: PastMut<'_>,
         survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,
@@ -159,7 +161,7 @@ pub(crate) trait ForceModel: Send + Sync {
     }
 
     /// Looks at a range of elements of a coupled model.
-    fn survey(&self, _range: Range<usize>, _x: &[Vec3], _memory: &[f64], _survey: Survey<&mut [f64]>) {}
+    fn survey(&self, _range: Range<usize>, _x: &[Vec3], _memory: Past<'_>, _survey: Survey<&mut [f64]>) {}
 
     /// Second pass of [`ForceModel::linearise`] over a coupled model.
     fn couple(
@@ -168,7 +170,7 @@ pub(crate) trait ForceModel: Send + Sync {
         _x: &[Vec3],
         _v: &[Vec3],
         _linear: &Linear,
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         _forces: &mut [Vec3],
         _couplings: Couplings<'_>,
@@ -182,6 +184,11 @@ pub(crate) trait ForceModel: Send + Sync {
     /// Says at which time [s] forces and energy are asked for, for laws that change with it.
     fn set_time(&mut self, _time: f64) {}
 
+    /// Whether it is the force of the air.
+    fn is_air(&self) -> bool {
+        false
+    }
+
     /// Whether it resists bending.
     fn bends(&self) -> bool {
         false
@@ -192,16 +199,20 @@ pub(crate) trait ForceModel: Send + Sync {
         1.0
     }
 
+    /// Asks that an element remembers only once it has left the elastic range of its law, `neglected` being what may be
+    /// neglected there (see `BendingLaw::leaves`); before any motion. Nothing for laws without memory.
+    fn remember_beyond(&mut self, _neglected: f64) {}
+
     /// Memory of all elements before any motion; empty for laws without.
-    fn unused(&self) -> Vec<f64> {
-        Vec::new()
+    fn unused(&self) -> Memory {
+        Memory::default()
     }
 
     /// Takes a motion to `x` as done: the memory of a range of elements moves on.
-    fn accept(&self, _range: Range<usize>, _x: &[Vec3], _memory: &mut [f64]) {}
+    fn accept(&self, _range: Range<usize>, _x: &[Vec3], _memory: PastMut<'_>) {}
 
-    /// Each hinge of a law with memory as it stands; empty for other models.
-    fn hinge_states(&self, _memory: &[f64]) -> Vec<HingeState> {
+    /// Each hinge of a law with memory as it stands at `x`, to which its memory has moved on; empty for other models.
+    fn hinge_states(&self, _x: &[Vec3], _memory: &Memory) -> Vec<HingeState> {
         Vec::new()
     }
 

@@ -11,7 +11,10 @@
 
 use std::ops::Range;
 
-use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey};
+use super::{
+    Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey,
+    memory::{Past, PastMut},
+};
 use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
 
 /// Length relative to the rest length under which a spring has no direction.
@@ -121,7 +124,7 @@ impl ForceModel for Springs {
         &self,
         range: Range<usize>,
         x: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         energy: &mut Energy,
     ) {
@@ -142,7 +145,7 @@ impl ForceModel for Springs {
         range: Range<usize>,
         x: &[Vec3],
         v: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         out: &mut [Vec3],
     ) {
@@ -159,7 +162,7 @@ impl ForceModel for Springs {
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
-        _memory: &mut [f64],
+        _memory: PastMut<'_>,
         _survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,

@@ -9,7 +9,10 @@
 
 use std::ops::Range;
 
-use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey};
+use super::{
+    Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey,
+    memory::{Past, PastMut},
+};
 use crate::{EffectInfo, Energy, mesh::Vec3};
 
 /// Two vertices that are sewn together.
@@ -105,7 +108,7 @@ impl ForceModel for Stitches {
         &self,
         range: Range<usize>,
         x: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         energy: &mut Energy,
     ) {
@@ -121,7 +124,7 @@ impl ForceModel for Stitches {
         range: Range<usize>,
         x: &[Vec3],
         _v: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         out: &mut [Vec3],
     ) {
@@ -140,7 +143,7 @@ impl ForceModel for Stitches {
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
-        _memory: &mut [f64],
+        _memory: PastMut<'_>,
         _survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,

@@ -18,7 +18,10 @@
 
 use std::ops::Range;
 
-use super::{Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey};
+use super::{
+    Block, CouplingKind, Couplings, ForceModel, Linear, Psd, Survey,
+    memory::{Past, PastMut},
+};
 use crate::{CoreError, EffectInfo, Energy, mesh::Vec3};
 
 /// Length of w under which it has no direction.
@@ -159,7 +162,7 @@ impl ForceModel for StretchShear {
         &self,
         range: Range<usize>,
         x: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         energy: &mut Energy,
     ) {
@@ -178,7 +181,7 @@ impl ForceModel for StretchShear {
         range: Range<usize>,
         x: &[Vec3],
         v: &[Vec3],
-        _memory: &[f64],
+        _memory: Past<'_>,
         _survey: Survey<&[f64]>,
         out: &mut [Vec3],
     ) {
@@ -205,7 +208,7 @@ impl ForceModel for StretchShear {
         x: &[Vec3],
         v: &[Vec3],
         linear: &Linear,
-        _memory: &mut [f64],
+        _memory: PastMut<'_>,
         _survey: Survey<&mut [f64]>,
         forces: &mut [Vec3],
         couplings: Couplings<'_>,

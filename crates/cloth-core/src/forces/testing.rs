@@ -2,11 +2,12 @@
 
 use nalgebra::{DMatrix, DVector, Rotation3, SymmetricEigen, Vector3};
 
-use super::{ForceModel, Linear, Psd, Survey};
+use super::{ForceModel, Linear, Psd, Survey, memory::Memory};
 use crate::{
     Energy,
     assembly::{Assembler, BlockMatrix, Corners, surveyed},
     mesh::Vec3,
+    system::accept,
 };
 
 /// Step of central differences [m] or [m/s], for coordinates of order 1: truncation and rounding both near 10⁻¹⁰.
@@ -45,17 +46,27 @@ impl Random {
 /// A model with its memory, as the system holds both.
 pub(crate) struct Model {
     pub(crate) law: Box<dyn ForceModel>,
-    pub(crate) memory: Vec<f64>,
+    pub(crate) memory: Memory,
 }
 
 impl Model {
     pub(crate) fn new(law: impl ForceModel + 'static) -> Self {
+        Self::boxed(Box::new(law))
+    }
+
+    /// One whose elements remember beyond the elastic range alone.
+    pub(crate) fn lean(mut law: impl ForceModel + 'static, neglected: f64) -> Self {
+        law.remember_beyond(neglected);
+        Self::boxed(Box::new(law))
+    }
+
+    fn boxed(law: Box<dyn ForceModel>) -> Self {
         let memory = law.unused();
-        Self { law: Box::new(law), memory }
+        Self { law, memory }
     }
 
     pub(crate) fn accept(&mut self, x: &[Vec3]) {
-        self.law.accept(0..self.law.count(), x, &mut self.memory);
+        accept(&*self.law, &mut self.memory, x);
     }
 }
 
@@ -69,7 +80,14 @@ fn survey(model: &Model, x: &[Vec3]) -> Survey<Vec<f64>> {
 pub(crate) fn forces(model: &Model, x: &[Vec3], v: &[Vec3]) -> Vec<Vec3> {
     let mut corners = vec![Vec3::zeros(); model.law.vertices().len()];
     let all = 0..model.law.count();
-    model.law.forces(all.clone(), x, v, &model.memory, surveyed(&survey(model, x), all), &mut corners);
+    model.law.forces(
+        all.clone(),
+        x,
+        v,
+        model.memory.part(all.len(), all.clone()),
+        surveyed(&survey(model, x), all),
+        &mut corners,
+    );
     scatter(model, &corners, x.len())
 }
 
@@ -84,7 +102,13 @@ fn scatter(model: &Model, corners: &[Vec3], n: usize) -> Vec<Vec3> {
 pub(crate) fn energy(model: &Model, x: &[Vec3]) -> f64 {
     let mut energy = Energy::default();
     let all = 0..model.law.count();
-    model.law.add_energy(all.clone(), x, &model.memory, surveyed(&survey(model, x), all), &mut energy);
+    model.law.add_energy(
+        all.clone(),
+        x,
+        model.memory.part(all.len(), all.clone()),
+        surveyed(&survey(model, x), all),
+        &mut energy,
+    );
     energy.elastic()
 }
 

@@ -9,12 +9,14 @@ mod newton;
 mod overshoot;
 mod semi_implicit;
 mod stability;
+mod work;
 
 use std::sync::Arc;
 
 use crate::{ClothSystem, CoreError, Psd, SolverParams, StepError, mesh::Vec3};
 
 pub use constraints::{ActiveSet, Constraint};
+pub use work::{Motion, Work};
 
 /// Time integration scheme.
 #[derive(
@@ -122,13 +124,13 @@ pub struct Integrator {
     pool: Arc<rayon::ThreadPool>,
     /// Which vertices are pinned in the step under way; all false between steps.
     pinned: Vec<bool>,
-    work: Work,
+    work: Scheme,
     /// Whether linearised steps that would make energy are solved to their end.
     mends: bool,
 }
 
 /// Work space of the scheme in use.
-enum Work {
+enum Scheme {
     Explicit(explicit::Buffers),
     Implicit(Box<implicit::Workspace>),
     SemiImplicit(Box<(semi_implicit::SubSteps, implicit::Workspace)>),
@@ -164,14 +166,14 @@ impl Integrator {
             system.split_bending();
         }
         let work = if params.method.is_explicit() {
-            Work::Explicit(explicit::Buffers::new(&system))
+            Scheme::Explicit(explicit::Buffers::new(&system))
         } else {
             let implicit = implicit::Workspace::new(&system, &params);
             match system.apart() {
                 Some(bending) => {
-                    Work::SemiImplicit(Box::new((semi_implicit::SubSteps::new(bending), implicit)))
+                    Scheme::SemiImplicit(Box::new((semi_implicit::SubSteps::new(bending), implicit)))
                 }
-                None => Work::Implicit(Box::new(implicit)),
+                None => Scheme::Implicit(Box::new(implicit)),
             }
         };
         let pinned = vec![false; system.vertex_count()];
@@ -203,9 +205,9 @@ impl Integrator {
     /// Memory of work space, matrix and slot maps [B].
     pub fn bytes(&self) -> usize {
         match &self.work {
-            Work::Explicit(buffers) => buffers.bytes(),
-            Work::Implicit(work) => work.bytes(),
-            Work::SemiImplicit(work) => work.0.bytes() + work.1.bytes(),
+            Scheme::Explicit(buffers) => buffers.bytes(),
+            Scheme::Implicit(work) => work.bytes(),
+            Scheme::SemiImplicit(work) => work.0.bytes() + work.1.bytes(),
         }
     }
 
@@ -279,13 +281,13 @@ impl Integrator {
         }
         let prescribed = Prescribed { pins, pinned, mends: *mends };
         let result = pool.install(|| match work {
-            Work::Explicit(buffers) => Ok(buffers.step(system, params.method, x, v, dt, &prescribed)),
-            Work::Implicit(work) => {
+            Scheme::Explicit(buffers) => Ok(buffers.step(system, params.method, x, v, dt, &prescribed)),
+            Scheme::Implicit(work) => {
                 let step =
                     if params.method == Method::ImplicitNewton { newton::step } else { implicit_euler::step };
                 step(work, system, params, x, v, dt, &prescribed, set)
             }
-            Work::SemiImplicit(work) => {
+            Scheme::SemiImplicit(work) => {
                 let (sub_steps, work) = &mut **work;
                 sub_steps.step(work, system, params, x, v, dt, &prescribed, set)
             }

@@ -313,7 +313,7 @@ impl Kernel for General {
             }
             let mut changed = false;
             if !contact.friction.broken {
-                let u = contact.relative(&motion.buffers.velocity);
+                let u = contact.relative(motion.buffers.kept());
                 let sliding = u - contact.normal * contact.normal.dot(&u);
                 let stop = contact.impulse - contact.normal * lambda - sliding * contact.mass;
                 let threshold = self.laws[contact.friction.law as usize].mu_s * lambda;

@@ -7,7 +7,8 @@
 //!
 //! The impulse acts along the edge as it is at the start of the step: linear and angular momentum of the straight motion
 //! are both kept. Where the edge turns by more than [`LEAST_AGREEMENT`] within the step (about 25°), it acts along the edge as it
-//! would be at the end, and angular momentum is kept to first order in that turn only.
+//! would be at the end, and angular momentum is kept to first order in that turn only. Contact may turn the edge once more: then the
+//! impulse is given up and another made, as one across the edge cannot keep it, and several across theirs throw a vertex away.
 //!
 //! The length is not linear in the impulse: the condition is made anew, exact for the edge alone, from what the sweeps gave,
 //! until all edges are inside. It aims a hair inside of the limit ([`MARGIN`]); the limit itself is what is kept.
@@ -68,9 +69,10 @@ impl Limiter {
         self.contacts.fill([NONE; 2]);
     }
 
-    /// Makes the condition of every edge beyond or near its limit from the motion as it is; whether none is beyond.
-    pub(crate) fn linearise<K: Kernel>(&mut self, set: &mut ContactSet<K>, motion: &Motion<'_>) -> bool {
-        let mut inside = true;
+    /// Makes the condition of every edge beyond or near its limit from the motion as it is; the largest excess, as a fraction of
+    /// l₀, or 0 where no edge is beyond.
+    pub(crate) fn linearise<K: Kernel>(&mut self, set: &mut ContactSet<K>, motion: &Motion<'_>) -> f64 {
+        let mut worst = 0.0_f64;
         for (edge, slots) in self.edges.iter().zip(&mut self.contacts) {
             let [a, b] = edge.vertices.map(|v| v as usize);
             if motion.inv_mass[a] + motion.inv_mass[b] == 0.0 {
@@ -80,7 +82,14 @@ impl Limiter {
             for side in [Side::Stretch, Side::Compression] {
                 let Some(bound) = bound(edge, side, d0.norm()) else { continue };
                 let slot = &mut slots[side as usize];
-                inside &= !bound.broken_by(d1.norm());
+                if bound.broken_by(d1.norm()) {
+                    worst = worst.max((d1.norm() - bound.limit).abs() / edge.rest_length);
+                    // Across its own direction an impulse does not shorten an edge: that one is given up for another.
+                    if *slot != NONE && !agrees(&set.contact(*slot).normal, &d1) {
+                        set.set_least(*slot, f64::NEG_INFINITY);
+                        *slot = NONE;
+                    }
+                }
                 if *slot == NONE {
                     if !bound.near(d1.norm()) {
                         continue;
@@ -98,7 +107,7 @@ impl Limiter {
                 set.set_least(*slot, least);
             }
         }
-        inside
+        worst
     }
 
     /// Writes the strains after the step.
@@ -108,7 +117,8 @@ impl Limiter {
         motion: &Motion<'_>,
         info: &mut ResponseInfo,
     ) {
-        let loaded = |slot: &u32| *slot != NONE && set.contact(*slot).impulse.norm_squared() > 0.0;
+        let acts = |contact: &Contact<K::State>| contact.impulse != Vec3::zeros() || contact.push != 0.0;
+        let loaded = |slot: &u32| *slot != NONE && acts(set.contact(*slot));
         info.limited_edges = self.contacts.iter().filter(|slots| slots.iter().any(loaded)).count();
         for edge in &self.edges {
             let [a, b] = edge.vertices.map(|v| v as usize);
@@ -197,6 +207,11 @@ impl Bound {
     }
 }
 
+/// Whether the unit vector `n` is near the line of the edge `d`.
+fn agrees(n: &Vec3, d: &Vec3) -> bool {
+    n.dot(d).abs() > LEAST_AGREEMENT * d.norm()
+}
+
 /// The contact of an edge, without its condition. `None` if both vertices are prescribed.
 fn new_contact<S: Copy>(
     edge: &LimitedEdge,
@@ -207,7 +222,7 @@ fn new_contact<S: Copy>(
     friction: S,
 ) -> Option<Contact<S>> {
     let (l0, l1) = (d0.norm(), d1.norm());
-    let along = if d0.dot(&d1) > LEAST_AGREEMENT * l0 * l1 { d0 / l0 } else { d1 / l1 };
+    let along = if d0.dot(&d1) > 0.0 && agrees(&(d0 / l0), &d1) { d0 / l0 } else { d1 / l1 };
     if !along.iter().all(|c| c.is_finite()) {
         return None;
     }

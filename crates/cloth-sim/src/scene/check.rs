@@ -1,6 +1,6 @@
 //! Value ranges and what belongs together, as far as the scene alone can tell.
 
-use super::{Cloth, Collider, ContactMethod, Keyframe, Pin, Rotation, Scene, SceneError};
+use super::{Cloth, Collider, ContactMethod, Effects, Keyframe, Pin, Rotation, Scene, SceneError};
 use crate::device::method_names;
 
 impl Scene {
@@ -84,10 +84,14 @@ impl Scene {
     }
 
     fn check_effects(&self) -> Result<(), SceneError> {
-        let tolerance = self.effects.friction_tolerance;
-        if !(tolerance > 0.0 && tolerance < 1.0) {
-            let got = tolerance.to_string();
-            return Err(self.error("effects.friction_tolerance", "a number > 0 and < 1", got));
+        let Effects { friction_tolerance, history_tolerance, .. } = self.effects;
+        for (key, tolerance) in [
+            ("effects.friction_tolerance", friction_tolerance),
+            ("effects.history_tolerance", history_tolerance),
+        ] {
+            if !(tolerance > 0.0 && tolerance < 1.0) {
+                return Err(self.error(key, "a number > 0 and < 1", tolerance.to_string()));
+            }
         }
         let Some(sleep) = &self.effects.sleep else { return Ok(()) };
         self.positive("effects.sleep.speed", sleep.speed, "m/s")?;

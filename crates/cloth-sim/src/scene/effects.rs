@@ -17,6 +17,14 @@ pub struct Effects {
     pub friction: Choice,
     /// Largest relative error that `friction = "auto"` may make in a coefficient [-], in (0, 1).
     pub friction_tolerance: f64,
+    /// What hinges of laws with memory (`plastic`, `hysteresis`) remember: "auto" begins with it where a hinge leaves the elastic range.
+    /// Results of the plastic law do not depend on it.
+    pub history: Choice,
+    /// Largest error that `history = "auto"` may make in a hinge's moment, as a share of the frictional moment of its law
+    /// (`hysteresis`) [-], in (0, 1).
+    pub history_tolerance: f64,
+    /// The account of energy in every step, as it is kept anyway where contact touches: mechanical energy, work of pins and of air.
+    pub energy_account: bool,
     /// Cloth that has come to rest is no longer stepped until something that moves comes near; without this table none sleeps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sleep: Option<Sleep>,
@@ -25,7 +33,16 @@ pub struct Effects {
 impl Default for Effects {
     fn default() -> Self {
         let on = Choice::On;
-        Self { self_collision: on, ccd: on, friction: on, friction_tolerance: 0.01, sleep: None }
+        Self {
+            self_collision: on,
+            ccd: on,
+            friction: on,
+            friction_tolerance: 0.01,
+            history: on,
+            history_tolerance: 0.01,
+            energy_account: false,
+            sleep: None,
+        }
     }
 }
 

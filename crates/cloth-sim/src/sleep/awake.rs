@@ -4,8 +4,9 @@ use crate::constraints::failure;
 use crate::guard::Alarm;
 use crate::step::Failure;
 use crate::{SimError, Simulation, Vec3, plan};
-use cloth_core::{Bending, ClothPart, ClothSystem, Energy, Integrator, Pins, StepInfo};
-use std::ops::Range;
+use cloth_core::{
+    Bending, ClothPart, ClothSystem, Energy, History, Integrator, Motion, Pins, StepInfo, Work,
+};
 use std::sync::Arc;
 
 /// The dynamics of awake cloth: its vertices without gaps.
@@ -68,6 +69,13 @@ impl Awake {
         Ok(info)
     }
 
+    /// [`Integrator::work`] of the awake cloth, between states of all bodies.
+    pub(crate) fn work(&self, from: Motion<'_>, to: Motion<'_>, dt: f64) -> Work {
+        let Some(integrator) = &self.integrator else { return Work::default() };
+        let [x0, v0, x1, v1] = [from.x, from.v, to.x, to.v].map(|all| self.gather(all));
+        integrator.work(Motion { x: &x0, v: &v0 }, Motion { x: &x1, v: &v1 }, dt, &self.pins)
+    }
+
     pub(crate) fn accept(&mut self) {
         if let Some(integrator) = &mut self.integrator {
             integrator.accept();
@@ -84,38 +92,43 @@ impl Awake {
 impl Simulation {
     /// What bending laws remember of the path so far.
     pub(crate) fn memory(&self) -> Vec<f64> {
-        let mut memory = self.integrator.system().memory(&self.state.x);
-        let Some(awake) = self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) else { return memory };
-        let Some(integrator) = &awake.integrator else { return memory };
-        let own = integrator.system().memory(&awake.gather(&self.state.x));
-        let mut rest = &own[..];
-        for (cloth, range) in self.memory_ranges() {
-            if awake.cloths.contains(&cloth) {
-                let (mine, others) = rest.split_at(range.len());
-                memory[range].copy_from_slice(mine);
-                rest = others;
-            }
-        }
-        memory
+        self.memories().concat()
     }
 
-    /// The cloths whose law remembers, and where their numbers stand in [`Simulation::memory`].
-    fn memory_ranges(&self) -> Vec<(usize, Range<usize>)> {
+    /// The same, one list per cloth of [`Simulation::remembering`].
+    fn memories(&self) -> Vec<Vec<f64>> {
+        let mut memories = self.integrator.system().memories(&self.state.x);
+        let Some(awake) = self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) else { return memories };
+        let Some(integrator) = &awake.integrator else { return memories };
+        let own = integrator.system().memories(&awake.gather(&self.state.x));
+        let theirs = self.remembering().zip(&mut memories).filter(|(cloth, _)| awake.cloths.contains(cloth));
+        for ((_, memory), own) in theirs.zip(own) {
+            *memory = own;
+        }
+        memories
+    }
+
+    /// The cloths whose law remembers, where each cloth has one law.
+    fn remembering(&self) -> impl Iterator<Item = usize> {
         let remembers = |c: &usize| {
             let body = &self.bodies.cloth[*c];
             matches!(body.material.bending, Bending::Plastic(_) | Bending::Hysteresis(_))
                 && !body.topology.hinges.is_empty()
         };
-        let mut first = 0;
-        let sizes = self.integrator.system().memory_sizes();
-        let cloths = (0..self.bodies.cloth.len()).filter(remembers);
-        cloths
-            .zip(sizes)
-            .map(|(cloth, size)| {
-                first += size;
-                (cloth, first - size..first)
-            })
-            .collect()
+        (0..self.bodies.cloth.len()).filter(remembers)
+    }
+
+    /// Of laws whose hinges remember only where they must: how many do, as of the start of the last step; of sleeping cloth as it
+    /// fell asleep.
+    pub(crate) fn histories(&self) -> Vec<History> {
+        let mut list = self.integrator.system().histories();
+        let Some(awake) = self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) else { return list };
+        let Some(integrator) = &awake.integrator else { return list };
+        let theirs = self.remembering().zip(&mut list).filter(|(cloth, _)| awake.cloths.contains(cloth));
+        for ((_, history), own) in theirs.zip(integrator.system().histories()) {
+            *history = own;
+        }
+        list
     }
 
     /// Makes dynamics, masses and marks those of the cloth that is awake.
@@ -123,9 +136,9 @@ impl Simulation {
         if self.sleeper.is_none() {
             return Ok(());
         }
-        let memory = self.memory();
+        let memories = self.memories();
         let stage = |error: cloth_core::CoreError| crate::contact::stage("sleep", &error);
-        self.integrator.set_memory(&memory).map_err(stage)?;
+        self.integrator.set_memory(&memories.concat()).map_err(stage)?;
         let Some(mut sleeper) = self.sleeper.take() else { return Ok(()) };
         for (c, range) in sleeper.cloths.iter().enumerate() {
             sleeper.asleep[range.clone()].fill(self.state.rest.asleep[c]);
@@ -140,13 +153,13 @@ impl Simulation {
         let any = self.state.rest.asleep.contains(&true);
         // While none sleeps, all count as moving; else each attempt marks what does.
         sleeper.moving.fill(true);
-        sleeper.awake = any.then(|| self.awake(&memory)).transpose()?;
+        sleeper.awake = any.then(|| self.awake(&memories)).transpose()?;
         self.sleeper = Some(sleeper);
         Ok(())
     }
 
-    /// The dynamics of awake cloth with its part of `memory`.
-    fn awake(&self, memory: &[f64]) -> Result<Awake, SimError> {
+    /// The dynamics of awake cloth with its part of [`Simulation::memories`].
+    fn awake(&self, memories: &[Vec<f64>]) -> Result<Awake, SimError> {
         let cloths: Vec<usize> =
             (0..self.bodies.cloth.len()).filter(|&c| !self.state.rest.asleep[c]).collect();
         let (mut vertices, mut parts) = (Vec::new(), Vec::new());
@@ -177,11 +190,12 @@ impl Simulation {
         let error =
             |error: cloth_core::CoreError| SimError::InvalidScene(plan::core_error(&self.scene, &error));
         let environment = crate::simulation::environment(&self.scene);
-        let system = ClothSystem::new(&parts, &environment, awake.vertices.len()).map_err(error)?;
+        let mut system = ClothSystem::new(&parts, &environment, awake.vertices.len()).map_err(error)?;
+        crate::simulation::keep_history(&self.scene, &mut system).map_err(error)?;
         let params = *self.integrator.params();
         let mut integrator = Integrator::new(system, params, Arc::clone(&self.pool)).map_err(error)?;
-        let ranges = self.memory_ranges().into_iter().filter(|(cloth, _)| awake.cloths.contains(cloth));
-        let own: Vec<f64> = ranges.flat_map(|(_, range)| memory[range].iter().copied()).collect();
+        let mine = self.remembering().zip(memories).filter(|(cloth, _)| awake.cloths.contains(cloth));
+        let own: Vec<f64> = mine.flat_map(|(_, memory)| memory).copied().collect();
         integrator.set_memory(&own).map_err(error)?;
         let of_awake = integrator.system().energy(&awake.gather(&self.state.x), &awake.gather(&self.state.v));
         awake.energy = minus(energy, of_awake);

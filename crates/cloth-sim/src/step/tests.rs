@@ -150,7 +150,7 @@ fn a_retry_leaves_no_trace_in_contact_constraints() {
     let good = retried.state.clone();
     retried.state.v[7].x = 1e6;
     let before = retried.state.clone();
-    assert!(retried.attempt(0.02, 0.01, [0.01, 0.0], &mut crate::StepReport::default()).is_err());
+    assert!(retried.attempt(0.02, 0.01, false, &mut crate::StepReport::default()).is_err());
     assert_eq!(retried.state, before);
     retried.state = good;
     retried.fail = |time, dt| time < 0.015 && dt > 0.006;
@@ -371,4 +371,173 @@ fn energy_that_contact_makes_is_a_failed_step() {
     assert!(sim.report.refused.iter().any(|r| r.reason.contains("contact made")), "{:?}", sim.report.refused);
     assert!(made > 5.0, "the scene has something to find: {made}");
     assert!(kept < 0.2 * made, "{kept} of {made}");
+}
+
+/// A flag held by two corners in wind; they move up, if anything.
+fn flag(dt: f64, wind: f64, lift: f64, effects: &str) -> Simulation {
+    let text = format!(
+        r#"
+duration = 2.0
+[time]
+dt = {dt}
+[solver]
+tolerance = 1e-10
+[air]
+wind = [0.0, 0.0, {wind}]
+density = 1.2
+drag = 1.0
+lift = 0.5
+damping = 0.5
+[effects]
+{effects}
+[[cloth]]
+name = "flag"
+mesh = {{ generator = "grid", width = 0.4, height = 0.4, nx = 9, ny = 9 }}
+material = {{ areal_density = 0.2, in_plane = {{ model = "spring", stiffness = 100.0, damping = 0.01 }} }}
+pins = [{{ vertices = [0, 8], keyframes = [{{ time = 0.0 }}, {{ time = 1.0, position = [0.0, {lift}, 0.0] }}] }}]
+"#
+    );
+    let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+    let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+    Simulation::new(&scene, Assets::default(), options).unwrap()
+}
+
+/// Energy gained, work of pins, work of air in half a second [J].
+fn account(dt: f64, wind: f64, lift: f64) -> [f64; 3] {
+    let mut sim = flag(dt, wind, lift, "energy_account = true");
+    let start = sim.energy().total();
+    let mut work = [0.0; 2];
+    while sim.time() < 0.5 - 0.5 * dt {
+        sim.step().unwrap();
+        let entry = sim.report().steps.last().unwrap().energy.unwrap();
+        work[0] += entry.pins;
+        work[1] += entry.air;
+        assert!((entry.total - sim.energy().total()).abs() < 1e-12);
+    }
+    [sim.energy().total() - start, work[0], work[1]]
+}
+
+#[test]
+fn what_pins_and_wind_do_is_what_the_cloth_gains_and_loses() {
+    for (wind, lift) in [(0.0, 1.0), (6.0, 0.0), (4.0, -1.0)] {
+        // What is missing is lost: in damping, and to backward Euler, whose part falls with the step.
+        let [coarse, fine] = [2e-3, 5e-4].map(|dt| {
+            let [gained, pins, air] = account(dt, wind, lift);
+            if lift > 0.0 {
+                assert!(pins > 0.1, "lifting is work: {pins}");
+            }
+            if wind > 0.0 {
+                assert!(air.abs() > 1e-3, "wind works: {air}");
+            }
+            pins + air - gained
+        });
+        assert!(fine > 0.0 && coarse > fine, "{wind} {lift}: lost {coarse} {fine}");
+    }
+    // Slowly lifted, all the work of pins is height: 32 g by 0.1 m.
+    let mut sim = flag(2e-3, 0.0, 0.2, "energy_account = true");
+    for _ in 0..1000 {
+        sim.step().unwrap();
+    }
+    let (mut pins, mut air) = (0.0, 0.0);
+    for step in &sim.report().steps[..500] {
+        let entry = step.energy.unwrap();
+        (pins, air) = (pins + entry.pins, air + entry.air);
+    }
+    let _ = air;
+    assert!(pins > 0.032 * 9.81 * 0.2 * 0.9, "{pins}");
+}
+
+#[test]
+fn the_account_changes_no_bit_and_is_kept_only_where_it_is_asked_for() {
+    let (mut with, mut without) = (flag(5e-3, 3.0, 1.0, "energy_account = true"), flag(5e-3, 3.0, 1.0, ""));
+    for _ in 0..30 {
+        with.step().unwrap();
+        without.step().unwrap();
+    }
+    assert_eq!(with.state, without.state);
+    assert!(without.report.steps.iter().all(|s| s.energy.is_none()));
+    let mut landing = landing(true);
+    for _ in 0..20 {
+        landing.step().unwrap();
+    }
+    let kept: Vec<bool> = landing.report.steps.iter().map(|s| s.energy.is_some()).collect();
+    assert!(kept.contains(&true) && kept.contains(&false), "{kept:?}");
+}
+
+/// The card of [`landing`] with other things going on, of `extra` scene text put before its cloth.
+fn landing_among(time: &str, tables: &str, bodies: &str, audited: bool) -> Simulation {
+    let text = format!(
+        r#"
+duration = 1.0
+[time]
+{time}
+[contact]
+thickness = 0.004
+{tables}
+[[cloth]]
+name = "card"
+mesh = {{ generator = "grid", width = 0.1, height = 0.1, nx = 2, ny = 2 }}
+material = {{ areal_density = 0.2, in_plane = {{ model = "spring", stiffness = 1e4 }} }}
+position = [0.003, 0.1, 0.002]
+rotation = {{ axis = [1, 0, 1], angle = 0.6 }}
+{bodies}
+[[collider]]
+name = "floor"
+shape = {{ type = "plane", half_size = 1.0 }}
+"#
+    );
+    let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+    let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
+    let mut sim = Simulation::new(&scene, Assets::default(), options).unwrap();
+    sim.audited &= audited;
+    sim
+}
+
+#[test]
+fn energy_made_is_found_while_pins_move_wind_blows_cloth_sleeps_and_steps_are_chosen() {
+    let fixed = "dt = 0.0166";
+    let cloth = |name: &str, more: &str| {
+        format!(
+            "[[cloth]]\nname = \"{name}\"\nmesh = {{ generator = \"grid\", width = 0.1, height = 0.1, nx = 2, ny = 2 }}\n\
+             material = {{ areal_density = 0.2, in_plane = {{ model = \"spring\", stiffness = 10.0 }} }}\n{more}\n"
+        )
+    };
+    let moved = cloth(
+        "moved",
+        "position = [0.5, 1.0, 0.0]\n\
+         pins = [{ vertices = [0, 1], keyframes = [{ time = 0.0 }, { time = 1.0, position = [0.0, 0.01, 0.0] }] }]",
+    );
+    let still = cloth("still", "position = [0.5, 0.0041, 0.0]");
+    let sleep = "[effects]\nsleep = { speed = 0.05, time = 0.02 }\n[air]\ndamping = 0.1\n";
+    let wind = "[air]\nwind = [0.2, 0.0, 0.0]\ndensity = 1.2\ndrag = 1.0\n";
+    let loose = "dt = \"auto\"\ndt_tolerance = 100.0\ndt_max = 0.0166";
+    for (what, time, tables, bodies) in [
+        ("pins", fixed, "", moved.as_str()),
+        ("wind", fixed, wind, ""),
+        ("sleep", fixed, sleep, still.as_str()),
+        ("auto", loose, "", ""),
+    ] {
+        let run = |audited: bool| {
+            let mut sim = landing_among(time, tables, bodies, audited);
+            let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+            while sim.time() < 0.6 {
+                sim.step().unwrap();
+                let energy = sim.energy().total();
+                least = least.min(energy);
+                most = most.max(energy - least);
+            }
+            (most, sim)
+        };
+        let ((kept, sim), (made, _)) = (run(true), run(false));
+        println!("{what}: {kept:.2e} J made with the ledger, {made:.2e} J without");
+        let found = sim.report.refused.iter().any(|r| r.reason.contains("contact made"));
+        assert!(found, "{what}: {:?}", sim.report.refused);
+        assert!(kept < 0.5 * made, "{what}: {kept} of {made}");
+        if what == "sleep" {
+            assert!(
+                sim.report.steps.iter().any(|s| s.asleep > 0 && s.energy.is_some()),
+                "some slept meanwhile"
+            );
+        }
+    }
 }

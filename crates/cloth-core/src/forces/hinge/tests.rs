@@ -186,3 +186,95 @@ fn memory_costs_48_bytes_where_it_is_and_none_elsewhere() {
     let hysteresis = Hysteresis::new(curve, 0.5, 0.5).unwrap();
     assert_eq!(bytes(&bent(hysteresis, 0.0, [1.0; 2], 0.0)), linear + 48);
 }
+
+/// A path of one hinge: every motion turns it to a random angle within `reach` [rad].
+fn wander(random: &mut Random, reach: f64, steps: usize) -> Vec<f64> {
+    (0..steps).map(|_| reach * random.value()).collect()
+}
+
+#[test]
+fn plastic_history_that_starts_at_the_limit_changes_no_bit() {
+    let heights = [1.0, 0.8];
+    let law = Plastic::new(2.0, 0.4, 0.5).unwrap();
+    // h̄ = 0.9: the limit is an angle of 0.36.
+    let rest = || vec![Rest::new(1.0, heights.map(|h| 0.5 * h), 0.2)];
+    let hinges = || Hinges::new(law, 0.3, vec![[0, 1, 2, 3]], rest()).unwrap();
+    let (mut whole, mut lean) = (Model::new(hinges()), Model::lean(hinges(), 0.01));
+    let mut random = Random::new(12);
+    let v = random.vectors(4, 1.0);
+    let path = [wander(&mut random, 0.3, 40), wander(&mut random, 1.5, 40), wander(&mut random, 0.3, 40)];
+    for (part, angles) in path.iter().enumerate() {
+        for angle in angles {
+            let x = folded(0.2 + angle, heights);
+            for trial in [0.1, 0.9] {
+                let x = folded(0.2 + angle + trial, heights);
+                assert_eq!(forces(&whole, &x, &v), forces(&lean, &x, &v));
+            }
+            whole.accept(&x);
+            lean.accept(&x);
+            assert_eq!(forces(&whole, &x, &v), forces(&lean, &x, &v));
+            assert_eq!(energy(&whole, &x).to_bits(), energy(&lean, &x).to_bits());
+            assert_eq!(whole.law.hinge_states(&x, &whole.memory), lean.law.hinge_states(&x, &lean.memory));
+        }
+        let kept = lean.memory.needed().unwrap().0;
+        assert_eq!(kept, usize::from(part > 0), "history starts with the flow, and stays");
+    }
+    // Planted: one that forgets where it flowed is seen.
+    lean.memory = lean.law.unused();
+    let x = folded(0.2, heights);
+    assert_ne!(forces(&whole, &x, &v), forces(&lean, &x, &v));
+}
+
+#[test]
+fn hysteresis_without_history_is_within_its_bound_on_any_path() {
+    let heights = [1.0, 1.0];
+    let curve = Curve::new(3.0, 1.0, -2.0).unwrap();
+    let law = Hysteresis::new(curve, 0.3, 0.1).unwrap();
+    let hinges = || Hinges::new(law, 0.0, vec![[0, 1, 2, 3]], vec![Rest::new(1.0, [0.5, 0.5], 0.0)]).unwrap();
+    let moment = |model: &Model, x: &[Vec3]| model.law.hinge_states(x, &model.memory)[0].moment;
+    let mut random = Random::new(4);
+    for neglected in [0.02, 0.2] {
+        // Not on the end itself, where rounding decides.
+        let range = 2.0 * neglected / (2.0 - neglected) * curve.k0() * (1.0 - 1e-9);
+        let mut worst = [0.0_f64; 2];
+        for round in 0..60 {
+            let (mut whole, mut lean) = (Model::new(hinges()), Model::lean(hinges(), neglected));
+            // Small turns about a place, whole ways from end to end, and all between.
+            let (middle, reach) = (range * random.value(), range * random.value().abs());
+            let inside = (0..200).map(|_| (middle + reach * random.value()).clamp(-range, range));
+            let ends = (0..6).map(|k| if k % 2 == 0 { range } else { -range });
+            let mut path: Vec<f64> = if round == 0 { ends.collect() } else { inside.collect() };
+            let within = path.len();
+            path.push(2.0 * curve.k0());
+            path.extend((0..60).map(|_| 3.0 * curve.k0() * random.value()));
+            for (k, curvature) in path.iter().enumerate() {
+                let x = folded(*curvature, heights);
+                whole.accept(&x);
+                lean.accept(&x);
+                let error = (moment(&whole, &x) - moment(&lean, &x)).abs() / curve.m0();
+                let part = usize::from(k >= within);
+                worst[part] = worst[part].max(error);
+                assert_eq!(lean.memory.needed().unwrap().0 > 0, k >= within, "{curvature}");
+            }
+        }
+        // Rounding of moments of order one.
+        assert!(worst[0] <= neglected + 1e-12, "{worst:?}");
+        assert!(worst[1] <= neglected + 1e-12, "the error does not grow once history is kept: {worst:?}");
+        assert!(worst[0] > 0.5 * neglected, "a bound that is half as large is not kept: {worst:?}");
+    }
+}
+
+#[test]
+fn a_hinge_without_history_has_the_energy_of_its_force() {
+    let law = Hysteresis::new(Curve::new(3.0, 1.0, -2.0).unwrap(), 0.3, 0.1).unwrap();
+    let hinges =
+        || Hinges::new(law, DAMPING, vec![[0, 1, 2, 3]], vec![Rest::new(1.0, [0.5, 0.4], 0.1)]).unwrap();
+    let mut random = Random::new(6);
+    for theta in [0.11, 0.13, 0.08] {
+        let x = folded(theta, [1.0, 0.8]).map(|x| x + random.vector() * 1e-3);
+        let lean = Model::lean(hinges(), 0.2);
+        check_derivatives(&lean, &x, "lean");
+        check_velocity_terms(&lean, &x, &random.vectors(4, 1.0), "lean");
+    }
+    assert_eq!(Model::lean(hinges(), 0.2).law.info().bytes + 48, Model::new(hinges()).law.info().bytes);
+}

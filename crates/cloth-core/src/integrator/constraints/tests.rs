@@ -9,7 +9,7 @@ use crate::{
     Bending, ClothPart, ClothSystem, Environment, InPlane, Integrator, IntegratorParams, Material, Method,
     Pins, SolverMethod, StepError, StepInfo,
     assembly::Lanes,
-    integrator::{Work, implicit::Workspace},
+    integrator::{Scheme, implicit::Workspace},
     mesh::{RestShape, Topology, TriMesh, Vec3, generators},
 };
 
@@ -180,7 +180,7 @@ fn elimination_equals_multipliers() {
             let (x1, v1, info) = step(&mut integrator, &mut set).unwrap();
             assert!(info.converged, "{solver:?}: {info:?}");
             // The matrix is as it was assembled: what was projected is put back.
-            let Work::Implicit(work) = &integrator.work else { panic!("implicit") };
+            let Scheme::Implicit(work) = &integrator.work else { panic!("implicit") };
             let (dv, impulses) = dense(work, &work.b, &v, &set.list);
             let expected: Vec<Vec3> = v.iter().zip(&dv).map(|(v, dv)| v + dv).collect();
             assert!(distance(&v1, &expected) < AGREEMENT, "{solver:?}: {:e}", distance(&v1, &expected));
