@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -69,5 +70,15 @@ def optional(module: str, *, extra: str, purpose: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        message = f"{purpose} needs the package {module.split('.', maxsplit=1)[0]}: pip install 'clothsim[{extra}]'"
-        raise MissingDependency(message) from error
+        raise _missing(module, extra, purpose) from error
+
+
+def demand(module: str, *, extra: str, purpose: str) -> None:
+    """Say what `optional` says where a top-level package is not installed, without importing it."""
+    if importlib.util.find_spec(module) is None:
+        raise _missing(module, extra, purpose)
+
+
+def _missing(module: str, extra: str, purpose: str) -> MissingDependency:
+    package = module.split(".", maxsplit=1)[0]
+    return MissingDependency(f"{purpose} needs the package {package}: pip install 'clothsim[{extra}]'")

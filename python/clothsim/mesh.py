@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clothsim import _core, _formats
-from clothsim._arrays import Floats, Ints, floats, indices
+from clothsim._arrays import Floats, Ints, floats, indices, number
 from clothsim._files import write_whole
 from clothsim._formats import RawMesh
 from clothsim.errors import InvalidInput
@@ -162,7 +162,9 @@ class Mesh:
         >>> cs.Mesh.grid(2.0, 2.0, 101, 101)
         Mesh(10201 vertices, 20000 triangles, uv)
         """
-        return cls._made(_core.grid(width, height, _whole("nx", nx), _whole("ny", ny)))
+        return cls._made(
+            _core.grid(number(width, "width"), number(height, "height"), _whole("nx", nx), _whole("ny", ny))
+        )
 
     @classmethod
     def disc(cls, radius: float, rings: int) -> Mesh:
@@ -175,7 +177,7 @@ class Mesh:
         rings : int
             Rings of triangles about the middle, ≥ 1.
         """
-        return cls._made(_core.disc(radius, _whole("rings", rings)))
+        return cls._made(_core.disc(number(radius, "radius"), _whole("rings", rings)))
 
     @classmethod
     def ribbon(cls, length: float, width: float, nx: int, ny: int, twist: float = 0.0) -> Mesh:
@@ -194,7 +196,8 @@ class Mesh:
         twist : float
             Angle between the ends [rad], right-handed about x.
         """
-        return cls._made(_core.ribbon(length, width, _whole("nx", nx), _whole("ny", ny), twist))
+        size = number(length, "length"), number(width, "width")
+        return cls._made(_core.ribbon(*size, _whole("nx", nx), _whole("ny", ny), number(twist, "twist")))
 
     @classmethod
     def cylinder(cls, radius: float, height: float, segments: int, rows: int, *, caps: bool = False) -> Mesh:
@@ -213,7 +216,8 @@ class Mesh:
         caps : bool
             Close both ends.
         """
-        return cls._made(_core.cylinder(radius, height, _whole("segments", segments), _whole("rows", rows), caps))
+        size = number(radius, "radius"), number(height, "height")
+        return cls._made(_core.cylinder(*size, _whole("segments", segments), _whole("rows", rows), caps))
 
     @classmethod
     def cone(cls, radius: float, height: float, segments: int) -> Mesh:
@@ -228,7 +232,7 @@ class Mesh:
         segments : int
             Vertices around, ≥ 3.
         """
-        return cls._made(_core.cone(radius, height, _whole("segments", segments)))
+        return cls._made(_core.cone(number(radius, "radius"), number(height, "height"), _whole("segments", segments)))
 
     @classmethod
     def capsule(cls, radius: float, half_height: float, segments: int, rings: int) -> Mesh:
@@ -245,7 +249,8 @@ class Mesh:
         rings : int
             Rings of each half sphere, ≥ 1.
         """
-        return cls._made(_core.capsule(radius, half_height, _whole("segments", segments), _whole("rings", rings)))
+        size = number(radius, "radius"), number(half_height, "half_height")
+        return cls._made(_core.capsule(*size, _whole("segments", segments), _whole("rings", rings)))
 
     @classmethod
     def sphere(cls, radius: float, subdivisions: int = 4) -> Mesh:
@@ -258,7 +263,7 @@ class Mesh:
         subdivisions : int
             How often each triangle is cut into four.
         """
-        return cls._made(_core.sphere(radius, _whole("subdivisions", subdivisions)))
+        return cls._made(_core.sphere(number(radius, "radius"), _whole("subdivisions", subdivisions)))
 
     @classmethod
     def box(cls, size: tuple[float, float, float], cells: tuple[int, int, int] = (1, 1, 1)) -> Mesh:

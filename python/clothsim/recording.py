@@ -114,7 +114,9 @@ class Recording:
         if self.times.ndim != 1:
             raise InvalidInput(f"times: expected shape (frames,), got shape {self.times.shape}", name="times")
         for what, array in (("moving", moving), ("standing", self._standing), ("velocities", velocities)):
-            if array is not None and not (isinstance(array, np.ndarray) and array.dtype == np.float64):
+            if array is None and what != "moving":
+                continue
+            if not (isinstance(array, np.ndarray) and array.dtype == np.float64):
                 got = str(getattr(array, "dtype", type(array).__name__))
                 raise InvalidInput(f"{what}: expected an array of float64, got {got}", name=what, got=got)
         expected = (len(self.times), sum(b.vertex_count for b in self.bodies if not b.static), 3)

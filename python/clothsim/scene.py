@@ -331,7 +331,8 @@ class Scene:
             source.get("fps"), source.get("scale") or 1.0, source.get("up"), self._data["up"], source.get("animation"),
             source.get("part"),
         )  # fmt: skip
-        return formats.read(path, request)
+        raw = formats.read(path, request)
+        return raw.positions, raw.triangles, raw.fps
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a scene file (TOML, defaults written out), and beside it the meshes that the scene holds as arrays.

@@ -23,11 +23,12 @@ DEFAULT_FPS = 60.0
 
 
 class RawAnimation(NamedTuple):
-    """Positions (frames, n, 3) [m], triangles (m, 3), and frames per second if the file says so."""
+    """Positions (frames, n, 3) [m], triangles (m, 3), frames per second and the axis that is up if the file says so."""
 
     positions: Floats
     triangles: Ints
     fps: float | None
+    up: str | None = None
 
 
 @dataclass(frozen=True)
@@ -71,28 +72,24 @@ def read(path: Path, request: Request) -> RawAnimation:
     """
     suffix = path.suffix.lower()
     load: Callable[[Path, Request], RawAnimation]
-    own_up: str | None = None
+    has_parts = suffix in (".gltf", ".glb", ".usd", ".usda", ".usdc", ".usdz")
     if suffix == ".npz":
         from clothsim._formats.archive import load
     elif suffix in (".gltf", ".glb"):
         from clothsim._formats.gltf import load
-
-        own_up = "y"
     elif suffix in (".usd", ".usda", ".usdc", ".usdz"):
-        from clothsim._formats.usd import load, up_axis
-
-        own_up = None if request.up else up_axis(path)
+        from clothsim._formats.usd import load
     else:
         from clothsim._formats.frames import load
     if suffix not in (".gltf", ".glb") and request.animation is not None:
         raise MeshError(f"{path}: animation: only a glTF file names its animations", kind="file")
-    if own_up is None and suffix not in (".usd", ".usda", ".usdc", ".usdz") and request.part is not None:
+    if not has_parts and request.part is not None:
         raise MeshError(f"{path}: part: only glTF and USD files have named parts", kind="file")
     raw = load(path, request)
     positions = raw.positions
     if request.scale != 1.0:
         positions = positions * request.scale
-    if (request.up or own_up or request.scene_up) != request.scene_up:
+    if (request.up or raw.up or request.scene_up) != request.scene_up:
         positions = turned(positions, to=request.scene_up)
     for frame, x in enumerate(positions):
         check_frame(path, frame, x)

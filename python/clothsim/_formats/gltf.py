@@ -45,7 +45,7 @@ def load(path: Path, request: Request) -> RawAnimation:
     for part, first in zip(parts, firsts, strict=False):
         part.write(nodes, positions[:, first : first + part.count])
     triangles = np.concatenate([part.triangles + first for part, first in zip(parts, firsts, strict=False)])
-    return RawAnimation(positions, triangles, fps)
+    return RawAnimation(positions, triangles, fps, "y")
 
 
 def _animation(document: Document, name: str | None) -> dict[str, Any] | None:

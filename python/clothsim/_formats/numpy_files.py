@@ -106,7 +106,7 @@ def _in_words() -> Iterator[None]:
         yield
     except (zipfile.BadZipFile, zlib.error, EOFError, struct.error, NotImplementedError, RuntimeError) as error:
         raise ValueError(str(error) or "the file is cut off") from error
-    except (OverflowError, IndexError, KeyError, AttributeError) as error:
+    except (OverflowError, IndexError, KeyError, AttributeError, TypeError) as error:
         raise ValueError(f"damaged ({error})") from error
     except MemoryError as error:
         raise ValueError(f"not enough memory ({error})") from error
