@@ -17,7 +17,7 @@ use cloth_response::{Side, Sides};
 use std::collections::BTreeMap;
 
 const MAGIC: [u8; 8] = *b"CLOTHSIM";
-const VERSION: u32 = 6;
+const VERSION: u32 = 7;
 /// Largest number of a state: beyond, not even its energy need be a number.
 const HUGE: f64 = 1e100;
 const HEADER: usize = MAGIC.len() + 4 + 8;
@@ -52,6 +52,7 @@ impl Simulation {
         let ledger = self.state.pace.ledger;
         payload.u64(u64::from(ledger.open));
         payload.f64(ledger.level);
+        payload.f64(ledger.base);
         payload.f64(ledger.scale);
         payload.numbers(&self.state.rest.asleep.iter().map(|a| f64::from(u8::from(*a))).collect::<Vec<_>>());
         payload.numbers(&self.state.rest.calm);
@@ -135,7 +136,12 @@ impl Simulation {
             return Err(invalid(format!("at most {most} halvings"), halvings.to_string()));
         }
         let control = Control { size: payload.f64()?, error: payload.f64()? };
-        let ledger = Ledger { open: payload.u64()? != 0, level: payload.f64()?, scale: payload.f64()? };
+        let ledger = Ledger {
+            open: payload.u64()? != 0,
+            level: payload.f64()?,
+            base: payload.f64()?,
+            scale: payload.f64()?,
+        };
         let pace = Pace { halvings: halvings as u32, good: good as u32, control, ledger };
         let rest = Rest {
             asleep: payload.numbers()?.into_iter().map(|a| a != 0.0).collect(),

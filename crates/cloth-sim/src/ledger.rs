@@ -5,9 +5,10 @@
 //! that the cloth has had since contact began, plus what has been done to it since: the work of pins and of air
 //! ([`cloth_core::Work`]; what they take away is not counted), and the most that moving colliders and pins can have done through
 //! contact. A step that exceeds it by more than half of the energy that has been in the motion fails like any other, and is tried with
-//! half the size. At the floor, `time.max_halvings` halvings, it is accepted, and the report says how much was made. But where that is
-//! more than all the energy that has been in the motion and nothing drives it, the cloth stays where it is and loses its velocity: a
-//! board of a millimetre that hits something with one corner would else be bent by more than it weighs, in every step.
+//! half the size. At the floor, `time.max_halvings` halvings, it is accepted, and the report says how much was made. But where all that
+//! was made since contact began and is not lost again is more than all the energy that has been in the motion, and nothing drives it, the
+//! cloth stays where it is and loses its velocity: a board of a millimetre that hits something with one corner would else be bent by
+//! more than it weighs, in many steps.
 //!
 //! Nothing is looked at in scenes without contact, in steps in which nothing touches, and under explicit integrators. With
 //! `effects.energy_account` energy and work are reported of all steps, whatever touches, and under any integrator.
@@ -28,9 +29,11 @@ const PUSHED: f64 = 4.0;
 pub(crate) struct Ledger {
     /// Whether the numbers hold.
     pub(crate) open: bool,
-    /// What the energy may be [J].
+    /// What the energy may be: after a step that made energy, what it is [J].
     pub(crate) level: f64,
-    /// Most kinetic and elastic energy of good steps [J].
+    /// What the energy might be if no step had made any [J].
+    pub(crate) base: f64,
+    /// Most kinetic and elastic energy of steps before which none was made, or what was is lost again [J].
     pub(crate) scale: f64,
 }
 
@@ -99,27 +102,29 @@ impl Simulation {
             ledger
         } else {
             let (level, scale) = sums(&self.state.x, &self.state.v);
-            Ledger { open: true, level, scale }
+            Ledger { open: true, level, base: level, scale }
         };
         // What starts nearer than its thickness is moved apart, against gravity where it has to be, and bent on the way.
         let gravity = Vec3::from(self.scene.gravity());
         let lifted = PUSHED * (-gravity.dot(&pushed)).max(0.0);
         let through_contact = self.most_through_contact(end);
-        let level = ledger.level + work.pins.max(0.0) + work.air.max(0.0) + through_contact + lifted;
+        let done = work.pins.max(0.0) + work.air.max(0.0) + through_contact + lifted;
+        let (level, base) = (ledger.level + done, ledger.base + done);
         let (made, opening) = (energy - level, self.opening());
         if made > ALLOWED * ledger.scale + opening {
-            let runs_away = made > ledger.scale + opening && through_contact == 0.0 && !self.is_driven(end);
+            let runs_away =
+                energy - base > ledger.scale + opening && through_contact == 0.0 && !self.is_driven(end);
             if !accept || runs_away {
                 return Err(Failure::Energy { made, level });
             }
             report.energy_made += made;
             note(report, entry);
-            // What was made is none of the motion's.
-            return Ok(Ledger { open: true, level: energy, scale: ledger.scale });
+            return Ok(Ledger { open: true, level: energy, base, scale: ledger.scale });
         }
         note(report, entry);
-        let scale = if made <= 0.0 { ledger.scale.max(moving) } else { ledger.scale };
-        Ok(Ledger { open: true, level: level.min(energy), scale })
+        // What was made is none of the motion's.
+        let scale = if energy <= base { ledger.scale.max(moving) } else { ledger.scale };
+        Ok(Ledger { open: true, level: level.min(energy), base: base.min(energy), scale })
     }
 
     /// The most that contact can have done to the cloth in a step: pushing along the way of the fastest collider or pin [J].
