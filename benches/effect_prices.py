@@ -30,7 +30,7 @@ ROOT = Path(__file__).parents[1]
 MODEL = ROOT / "crates" / "cloth-sim" / "src" / "cost_model.json"
 README = ROOT / "README.md"
 BEGIN, END = "<!-- effect prices: begin -->", "<!-- effect prices: end -->"
-COMMAND = "python benches/effect_prices.py --write"
+COMMAND = "python benches/effect_prices.py --steps 12 --write"
 WARM_UP = 5
 """Steps before the clock starts."""
 

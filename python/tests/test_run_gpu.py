@@ -154,7 +154,7 @@ def test_a_run_that_loses_its_gpu(gpu: str, tmp_path: Path, run_cli: RunCli) -> 
     scene = falling(tmp_path / "scene.toml", "virtual-subdivision")
 
     def losing(out: str, device: str) -> subprocess.CompletedProcess[str]:
-        command = ["run", scene, "-o", tmp_path / out, "--device", device, "--frames", str(FRAMES), "--quiet"]
+        command = ["run", scene, "-o", tmp_path / out, "--device", device, "--frames", str(FRAMES)]
         return subprocess.run(
             [sys.executable, "-c", LOSING, *map(str, command)], capture_output=True, text=True, check=False
         )

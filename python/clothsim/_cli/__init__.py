@@ -25,7 +25,7 @@ from clothsim._cli import (
     tune,
     view,
 )
-from clothsim._cli.logs import add_verbose, show_logs
+from clothsim._cli.logs import add_verbose, shown_logs
 from clothsim._core import __version__
 from clothsim.errors import ClothSimError, GpuUnavailable, MissingDependency, OutputError, OutputExists
 
@@ -85,9 +85,9 @@ def build_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code: 0, 1 if it failed, 2 for bad input, 130 after Ctrl-C."""
     options = build_parser().parse_args(arguments)
-    show_logs(options.verbose, quiet=getattr(options, "quiet", False))
     try:
-        code: int = options.execute(options)
+        with shown_logs(options.verbose, quiet=getattr(options, "quiet", False)):
+            code: int = options.execute(options)
         sys.stdout.flush()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

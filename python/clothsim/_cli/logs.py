@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import logging
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-__all__ = ["add_verbose", "show_logs"]
+__all__ = ["add_verbose", "shown_logs"]
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:
@@ -17,13 +19,21 @@ def add_verbose(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def show_logs(verbose: int, *, quiet: bool) -> None:
-    """Write what the logger ``clothsim`` gets to stderr: warnings; with ``quiet`` errors alone; more if asked."""
+@contextmanager
+def shown_logs(verbose: int, *, quiet: bool) -> Iterator[None]:
+    """Write what the logger ``clothsim`` gets to stderr: warnings; with ``quiet`` errors alone; more if asked.
+
+    Afterwards the logger is as it was: a program that calls the command line keeps its own logging.
+    """
     logger = logging.getLogger("clothsim")
+    level, handler = logger.level, _Stderr()
     logger.setLevel(logging.DEBUG if verbose > 1 else logging.INFO if verbose else _least(quiet=quiet))
-    for handler in [h for h in logger.handlers if isinstance(h, _Stderr)]:
+    logger.addHandler(handler)
+    try:
+        yield
+    finally:
         logger.removeHandler(handler)
-    logger.addHandler(_Stderr())
+        logger.setLevel(level)
 
 
 def _least(*, quiet: bool) -> int:
