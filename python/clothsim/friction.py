@@ -13,7 +13,6 @@ Examples
 
 from __future__ import annotations
 
-import difflib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from numpy.typing import ArrayLike
 
 from clothsim import _core
 from clothsim._arrays import Floats, floats, number
+from clothsim._nearest import hint
 from clothsim.errors import InvalidInput
 
 __all__ = ["LAWS", "Coefficient", "Model", "Pair", "Pairs", "force", "pairs"]
@@ -270,9 +270,9 @@ class Pairs(Mapping[str, Pair]):
         try:
             return self._pairs[name]
         except KeyError as error:
-            near = difflib.get_close_matches(str(name), self._pairs, 1)
-            hint = f' (did you mean "{near[0]}"?)' if near else ""
-            raise KeyError(f"expected one of {', '.join(self._pairs)}, got {name!r}{hint}") from error
+            raise KeyError(
+                f"expected one of {', '.join(self._pairs)}, got {name!r}{hint(name, self._pairs, 0.6)}"
+            ) from error
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._pairs)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import NoReturn
 
 import numpy as np
@@ -48,6 +50,17 @@ checkpoint_interval = 0.1
 GPU_METHODS = ["grid", "virtual-subdivision", "octree-single", "octree"]
 
 RunCli = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def load_module(path: Path) -> ModuleType:
+    """A Python file that is part of no package: a tool or an example."""
+    spec = importlib.util.spec_from_file_location(f"{path.parent.name}_{path.stem}", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their module up there
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import importlib.util
 import json
 import shutil
 import subprocess
@@ -12,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from conftest import load_module
 
 ROOT = Path(__file__).parents[2]
 
@@ -19,11 +19,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture(scope="module")
 def tool() -> ModuleType:
     """Load tools/check_arrows.py, which is not part of a package."""
-    spec = importlib.util.spec_from_file_location("check_arrows", ROOT / "tools" / "check_arrows.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return load_module(ROOT / "tools" / "check_arrows.py")
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,10 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import logging
 import shutil
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +51,16 @@ def test_every_block_has_a_language_and_few_are_not_run() -> None:
     not_run = [block for block in found if block.not_run]
     assert len(not_run) <= NOT_RUN_AT_MOST, [f"{block}: {block.not_run}" for block in not_run]
     assert len(found) > 60
+
+
+@pytest.fixture(autouse=True)
+def logging_as_it_was() -> Iterator[None]:
+    """A page that turns logging on does it for itself."""
+    root, package = logging.getLogger(), logging.getLogger("clothsim")
+    level, handlers = package.level, root.handlers[:]
+    yield
+    package.setLevel(level)
+    root.handlers[:] = handlers
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import email
-import importlib.util
 import re
 import subprocess
 import sys
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT, RunCli
+from conftest import ROOT, RunCli, load_module
 
 import clothsim as cs
 from clothsim import _core
@@ -21,13 +20,7 @@ PACKAGE = ROOT / "python" / "clothsim"
 
 
 def tool(name: str) -> Any:
-    spec = importlib.util.spec_from_file_location(f"wheel_{name}", ROOT / "tools" / "wheel" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_module(ROOT / "tools" / "wheel" / f"{name}.py")
 
 
 # Names of the standard library that Python 3.10 has not.

@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import ROOT, load_module
 
 gym = pytest.importorskip("gymnasium", reason="the extra 'robot' is not installed")
 
 
 @pytest.fixture(scope="module")
 def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("cloth_env", ROOT / "examples" / "cloth_env.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["cloth_env"] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_module(ROOT / "examples" / "cloth_env.py")
 
 
 def rollout(env: Any, seed: int, actions: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:

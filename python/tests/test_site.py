@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import re
@@ -14,7 +13,7 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, load_module
 
 import clothsim as cs
 from clothsim.reproduce import find
@@ -27,13 +26,7 @@ EFFECT = re.compile(r"^<!-- effect: (.*) -->$", re.MULTILINE)
 
 def tool(name: str) -> Any:
     """A module of tools/pages."""
-    spec = importlib.util.spec_from_file_location(f"pages_{name}", ROOT / "tools" / "pages" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module.__name__] = module
-    spec.loader.exec_module(module)
-    return module
+    return load_module(ROOT / "tools" / "pages" / f"{name}.py")
 
 
 class Page(HTMLParser):

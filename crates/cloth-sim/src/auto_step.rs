@@ -126,8 +126,7 @@ impl Simulation {
                         continue;
                     }
                     let floor = report.retries >= time.max_halvings || 0.5 * dt < time.dt_min;
-                    let work = self.work_to(&state, dt);
-                    match self.audit(&state, work, pushed, floor, &mut report) {
+                    match self.audit(&state, dt, pushed, floor, &mut report) {
                         Ok(ledger) => state.pace.ledger = ledger,
                         Err(failure) => {
                             self.remember_sides(sides);

@@ -61,7 +61,7 @@ impl Simulation {
     }
 
     /// Work of pins and air on the cloth over the step from the state as it is to `end`; none where no account is kept.
-    pub(crate) fn work_to(&self, end: &State, dt: f64) -> Option<Work> {
+    fn work_to(&self, end: &State, dt: f64) -> Option<Work> {
         if !(self.scene.effects.energy_account || self.judges(end)) {
             return None;
         }
@@ -72,14 +72,14 @@ impl Simulation {
         })
     }
 
-    /// The ledger after the step to `end`, in which `work` was done and repulsion pushed by `pushed` \[kg m\]
+    /// The ledger after the step of `dt` \[s\] to `end`, in which repulsion pushed by `pushed` \[kg m\]
     /// ([`cloth_response::ResponseInfo::pushed`]).
     ///
     /// With `accept` a step that made energy passes, and the ledger starts anew from there; but for one that made too much.
     pub(crate) fn audit(
         &self,
         end: &State,
-        work: Option<Work>,
+        dt: f64,
         pushed: Vec3,
         accept: bool,
         report: &mut StepReport,
@@ -87,7 +87,7 @@ impl Simulation {
         let ledger = self.state.pace.ledger;
         // What is done to the cloth while nothing touches is not followed: the next contact begins anew.
         let untouched = || if self.is_driven(end) { Ledger::default() } else { ledger };
-        let Some(work) = work else { return Ok(untouched()) };
+        let Some(work) = self.work_to(end, dt) else { return Ok(untouched()) };
         let sums = |x: &[Vec3], v: &[Vec3]| {
             let energy = self.energy_at(x, v);
             (energy.total(), energy.total() - energy.gravity)

@@ -15,7 +15,7 @@ use crate::pins::PinSet;
 use crate::report::add_seconds;
 use crate::sleep::Rest;
 use crate::{SimError, Simulation, StepReport, Vec3};
-use cloth_core::{Pins, StepInfo, Work};
+use cloth_core::{Pins, StepInfo};
 use cloth_response::ResponseInfo;
 use std::time::Instant;
 
@@ -110,8 +110,6 @@ pub(crate) struct Trial {
     dynamics: StepInfo,
     /// What response did, and the solves of contact constraints.
     contact: Option<(ResponseInfo, usize)>,
-    /// Of pins and air, where it is asked for.
-    pub(crate) work: Option<Work>,
     /// What it took [s].
     seconds: f64,
 }
@@ -186,7 +184,7 @@ impl Simulation {
     ) -> Result<(), Failure> {
         let mut trial = self.trial(t1, dt, report)?;
         let floor = floor || 0.5 * dt < self.scene.time.dt_min;
-        trial.state.pace.ledger = match self.audit(&trial.state, trial.work, trial.pushed(), floor, report) {
+        trial.state.pace.ledger = match self.audit(&trial.state, dt, trial.pushed(), floor, report) {
             Err(failure @ Failure::Energy { .. }) if floor => {
                 self.refuse(dt, &failure);
                 trial.note_work(report);
@@ -228,9 +226,8 @@ impl Simulation {
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let (state, info) = self.meet(t1, dt, x, v, holds, report)?;
-        let work = self.work_to(&state, dt);
         let seconds = started.elapsed().as_secs_f64();
-        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), work, seconds })
+        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), seconds })
     }
 
     /// The end of the step without contact but for constraints, what those did, and their solves.

@@ -1,11 +1,12 @@
-"""Arguments that several commands have, and what their values may be."""
+"""What several commands have: arguments, what their values may be, and the list of what was written."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from pathlib import Path
 
-__all__ = ["add_existing", "add_out", "count", "folder"]
+__all__ = ["add_existing", "add_out", "count", "folder", "written"]
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:
@@ -37,3 +38,15 @@ def count(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number ≥ 1, got {text!r}")
     return value
+
+
+def written(out: Path, names: Iterable[str]) -> list[str]:
+    """A line for each file, with its size, and folder, with its entries, of those that are there."""
+    lines = []
+    for path in (out / name for name in names):
+        if path.is_dir():
+            lines.append(f"  {path}/  {sum(1 for _ in path.iterdir())} entries")
+        elif path.exists():
+            size = path.stat().st_size
+            lines.append(f"  {path}  {size / 1e6:.1f} MB" if size >= 1e6 else f"  {path}  {size / 1e3:.0f} kB")
+    return lines

@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 
 from clothsim import _core
+from clothsim._files import write_whole
+from clothsim._nearest import hint
 from clothsim.errors import InvalidInput, OutputExists
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
@@ -33,15 +35,16 @@ def execute(options: argparse.Namespace) -> int:
     if options.scene not in scenes:
         expected = f"one of {', '.join(scenes)}"
         raise InvalidInput(
-            f"NAME: expected {expected}, got {options.scene!r}", name="NAME", expected=expected, got=options.scene
+            f"NAME: expected {expected}, got {options.scene!r}{hint(options.scene, scenes)}",
+            name="NAME",
+            expected=expected,
+            got=options.scene,
         )
     text = scenes[options.scene]
     if options.out is not None:
-        try:
-            with options.out.open("x", encoding="utf-8") as file:
-                file.write(text)
-        except FileExistsError as error:
-            raise OutputExists(f"{options.out}: is there already") from error
+        if options.out.exists():
+            raise OutputExists(f"{options.out}: is there already")
+        write_whole(options.out, text.encode())
     if options.json:
         print(json.dumps({"name": options.scene, "scene": text, "out": options.out and str(options.out)}))
     elif options.out is not None:

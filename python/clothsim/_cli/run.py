@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from clothsim._cli.arguments import add_existing, add_out, count, folder
+from clothsim._cli.arguments import add_existing, add_out, count, folder, written
 from clothsim._cli.device import add_device
 from clothsim._cli.export import read_run
 from clothsim._device import check_device, check_threads
@@ -102,10 +102,4 @@ def _summary(report: dict[str, Any], out: Path) -> str:
         lines.append(f"  intersecting pairs of triangles at most: {report['max_intersections']}")
     if report["totals"]["not_converged"]:
         lines.append(f"  steps that met a cap before their tolerance: {report['totals']['not_converged']}")
-    for name in report["outputs"]:
-        path = out / name
-        if path.is_dir():
-            lines.append(f"  {path}/  {sum(1 for _ in path.iterdir())} files")
-        elif path.exists():
-            lines.append(f"  {path}  {path.stat().st_size / 1e6:.1f} MB")
-    return "\n".join(lines)
+    return "\n".join([*lines, *written(out, report["outputs"])])

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from clothsim._cli.arguments import add_existing, count, folder
+from clothsim._cli.arguments import add_existing, count, folder, written
 from clothsim._cli.study import fixed_values, interruptible
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
@@ -113,10 +113,4 @@ def _summary(facts: dict[str, Any], out: Path) -> str:
         lines[0] += " (complete already: nothing to do)"
     if facts.get("started_again"):
         lines.append(f"  runs started again after their worker was lost: {facts['started_again']}")
-    for name in facts["files"]:
-        path = out / name
-        if path.is_dir():
-            lines.append(f"  {path}/  {sum(1 for _ in path.iterdir())} entries")
-        elif path.exists():
-            lines.append(f"  {path}  {path.stat().st_size / 1e3:.0f} kB")
-    return "\n".join(lines)
+    return "\n".join([*lines, *written(out, facts["files"])])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clothsim._nearest import hint
 from clothsim.errors import InvalidInput
 
 __all__ = ["CONTACT_COLOURS", "MAPS", "ColourMap", "colour_map", "nice_ceiling", "rgb", "table"]
@@ -65,10 +65,10 @@ def colour_map(name: str) -> ColourMap:
     """
     if name in MAPS:
         return MAPS[name]
-    near = difflib.get_close_matches(name, MAPS, n=1, cutoff=0.5)
-    hint = f' (did you mean "{near[0]}"?)' if near else ""
     expected = f"one of {', '.join(MAPS)}"
-    raise InvalidInput(f"--color: expected {expected}, got {name!r}{hint}", name="--color", expected=expected, got=name)
+    raise InvalidInput(
+        f"--color: expected {expected}, got {name!r}{hint(name, MAPS)}", name="--color", expected=expected, got=name
+    )
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

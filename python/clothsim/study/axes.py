@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import difflib
 import itertools
 import math
 import re
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from clothsim._nearest import hint
 from clothsim._toml import tomllib
 from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
@@ -136,10 +136,10 @@ def axis(name: str, values: Any, *, most: int = _MOST_VALUES, once: bool = True)
     key = _KEYS.get(name, name)
     if key not in _OTHER and re.split(r"[.\[]", key, maxsplit=1)[0] not in _ROOTS:
         known = [*NAMED, *(root for root in _ROOTS if root != "duration"), "duration"]
-        close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-        hint = f' (did you mean "{close[0]}"?)' if close else ""
         expected = f"one of {', '.join(NAMED)}, or a key of the scene such as contact.friction or cloth[0].material"
-        raise InvalidInput(f'axis: expected {expected}, got "{name}"{hint}', name="axis", expected=expected, got=name)
+        raise InvalidInput(
+            f'axis: expected {expected}, got "{name}"{hint(name, known)}', name="axis", expected=expected, got=name
+        )
     if isinstance(values, (str, Mapping)) or not isinstance(values, (Sequence, np.ndarray)):
         values = [values]
     found = tuple(v.item() if isinstance(v, np.generic) else v for v in values)

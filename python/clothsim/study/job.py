@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from clothsim import _core
+from clothsim._nearest import one_of
 from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
 from clothsim.study import evaluate, machine, outputs
@@ -80,8 +81,8 @@ class Request:
         self.points = product(self.axes, sample, seed)
         names = [metric] if isinstance(metric, str) else list(metric or (["drape"] if seeds > 1 else ["rms"]))
         self.metrics = metrics(names)
-        self.reference = _one_of("reference", reference, _REFERENCES)
-        self.cost = _one_of("cost", cost, tuple(COSTS))
+        self.reference = one_of("reference", reference, _REFERENCES)
+        self.cost = one_of("cost", cost, tuple(COSTS))
         for name, count, least in (("seeds", seeds, 1), ("repeats", repeats, 1)):
             if not isinstance(count, int) or count < least:
                 raise InvalidInput(f"{name}: expected a whole number ≥ {least}, got {count!r}", name=name)
@@ -120,13 +121,6 @@ def based(scene: Scene, fixed: Mapping[str, Any]) -> dict[str, Any]:
         apply(data, only.key, value)
     checked: dict[str, Any] = json.loads(_core.Scene.from_json(json.dumps(data)).to_json())
     return checked
-
-
-def _one_of(name: str, value: str, known: Sequence[str]) -> str:
-    if value not in known:
-        expected = f"one of {', '.join(known)}"
-        raise InvalidInput(f'{name}: expected {expected}, got "{value}"', name=name, expected=expected, got=str(value))
-    return value
 
 
 def run(

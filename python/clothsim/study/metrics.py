@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from clothsim._arrays import Floats
+from clothsim._nearest import hint
 from clothsim.errors import InvalidInput
 from clothsim.study.state import State
 from clothsim.study.surface import hull_area, locate, nearest, sample, shadow_area
@@ -196,8 +196,8 @@ def metrics(names: list[str]) -> list[Metric]:
     """
     for name in names:
         if name not in METRICS:
-            close = difflib.get_close_matches(name, METRICS, n=1, cutoff=0.4)
-            hint = f' (did you mean "{close[0]}"?)' if close else ""
             expected = f"one of {', '.join(METRICS)}"
-            raise InvalidInput(f'metric: expected {expected}, got "{name}"{hint}', name="metric", expected=expected)
+            raise InvalidInput(
+                f'metric: expected {expected}, got "{name}"{hint(name, METRICS, 0.4)}', name="metric", expected=expected
+            )
     return [METRICS[name] for name in dict.fromkeys(names)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import difflib
 import itertools
 import json
 import math
@@ -14,6 +13,7 @@ from typing import Any
 
 from clothsim import _core
 from clothsim._device import DEVICES, GPU_METHODS, check_threads
+from clothsim._nearest import one_of
 from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.study.axes import Axis, apply, value_text
 
@@ -106,9 +106,9 @@ def build(base: Mapping[str, Any], axes: Sequence[Axis], settings: Settings) -> 
             if axis.key == "threads":
                 run = replace(run, threads=check_threads(value) or 1)
             elif axis.key == "device":
-                run = replace(run, device=_one_of("device", value, DEVICES))
+                run = replace(run, device=one_of("device", value, DEVICES, value_text(value)))
             elif axis.key == "precision":
-                run = replace(run, precision=_one_of("precision", value, _PRECISIONS))
+                run = replace(run, precision=one_of("precision", value, _PRECISIONS, value_text(value)))
             else:
                 apply(data, axis.key, value)
         checked = json.loads(_core.Scene.from_json(json.dumps(data)).to_json())
@@ -118,17 +118,6 @@ def build(base: Mapping[str, Any], axes: Sequence[Axis], settings: Settings) -> 
     if detector in GPU_METHODS and all(axis.key != "device" for axis in axes):
         run = replace(run, device="gpu")
     return replace(run, data=checked)
-
-
-def _one_of(name: str, value: Any, known: Sequence[str]) -> str:
-    if value not in known:
-        close = difflib.get_close_matches(str(value), known, n=1, cutoff=0.5)
-        hint = f' (did you mean "{close[0]}"?)' if close else ""
-        expected = f"one of {', '.join(known)}"
-        raise InvalidInput(
-            f'{name}: expected {expected}, got "{value_text(value)}"{hint}', name=name, expected=expected
-        )
-    return str(value)
 
 
 def check_each(base: Mapping[str, Any], axes: Sequence[Axis]) -> None:

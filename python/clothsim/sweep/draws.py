@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import zlib
 from collections.abc import Mapping, Sequence
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from clothsim._nearest import hint
 from clothsim.errors import InvalidInput
 from clothsim.study.axes import Axis, axis
 
@@ -71,9 +71,9 @@ def draw(name: str, table: Any) -> Draw:
         raise InvalidInput(f"draw {name}: expected {expected}, got {table!r}", name=name, expected=expected)
     kind, values = next(iter(table.items()))
     if kind not in KINDS:
-        close = difflib.get_close_matches(str(kind), KINDS, n=1, cutoff=0.5)
-        hint = f' (did you mean "{close[0]}"?)' if close else ""
-        raise InvalidInput(f'draw {name}: expected {expected}, got "{kind}"{hint}', name=name, got=str(kind))
+        raise InvalidInput(
+            f'draw {name}: expected {expected}, got "{kind}"{hint(kind, KINDS)}', name=name, got=str(kind)
+        )
     if isinstance(values, str) or not isinstance(values, Sequence) or not values:
         raise InvalidInput(f"draw {name}: {kind} takes a list of {KINDS[kind]}, got {values!r}", name=name)
     if kind != "choice":

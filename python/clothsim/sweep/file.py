@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import os
 from collections.abc import Mapping
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from clothsim import _core
+from clothsim._nearest import hint
 from clothsim._toml import tomllib
 from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.scene import Scene
@@ -78,11 +78,11 @@ def _made(tables: dict[str, Any], where: Path, fixed: dict[str, Any]) -> SweepFi
 def _known(prefix: str, table: Mapping[str, Any], keys: tuple[str, ...]) -> None:
     for key in table:
         if key not in keys:
-            close = difflib.get_close_matches(key, keys, n=1, cutoff=0.5)
-            hint = f' (did you mean "{close[0]}"?)' if close else ""
             expected = f"one of the keys {', '.join(keys)}"
             raise InvalidInput(
-                f'{prefix}{key}: expected {expected}, got the unknown key "{key}"{hint}', name=prefix + key, got=key
+                f'{prefix}{key}: expected {expected}, got the unknown key "{key}"{hint(key, keys)}',
+                name=prefix + key,
+                got=key,
             )
 
 
@@ -99,7 +99,7 @@ def _is_row(value: Mapping[str, Any]) -> bool:
 
 def _is_draw(value: Mapping[str, Any]) -> bool:
     return len(value) == 1 and not isinstance(next(iter(value.values())), Mapping) and bool(
-        difflib.get_close_matches(next(iter(value)), KINDS, n=1, cutoff=0.5)
+        hint(next(iter(value)), KINDS)
     )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
 from collections.abc import Mapping, Sequence
@@ -13,6 +12,7 @@ import numpy as np
 
 from clothsim import _core
 from clothsim._device import check_device, check_threads
+from clothsim._nearest import one_of
 from clothsim._run.outputs import check_packages
 from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
@@ -24,7 +24,7 @@ from clothsim.study.points import Settings, build
 from clothsim.study.worker import pack_scene
 from clothsim.sweep.draws import Draw, draw
 
-__all__ = ["COMBINE", "SERIES", "Request", "Run", "one_of"]
+__all__ = ["COMBINE", "SERIES", "Request", "Run"]
 
 COMBINE = ("product", "zip")
 # What a series can hold besides quantities of metrics.
@@ -209,16 +209,6 @@ class Request:
 def output_formats(base: Mapping[str, Any]) -> list[str]:
     """What ``[output]`` can ask for."""
     return [key for key, value in base["output"].items() if isinstance(value, bool) and key != "velocities"]
-
-
-def one_of(name: str, value: Any, known: Sequence[str]) -> str:
-    """Refuse what is not known, with the nearest that is."""
-    if value not in known:
-        close = difflib.get_close_matches(str(value), known, n=1, cutoff=0.5)
-        hint = f' (did you mean "{close[0]}"?)' if close else ""
-        expected = f"one of {', '.join(known)}"
-        raise InvalidInput(f'{name}: expected {expected}, got "{value}"{hint}', name=name, expected=expected)
-    return str(value)
 
 
 def _axes(vary: Mapping[str, Any] | Sequence[Axis], combine: str) -> list[Axis]:
