@@ -318,9 +318,9 @@ def write(prices: list[Price], steps: int, repeats: int) -> None:
     tail = rest.split(END)[1]
     intro = (
         f"61 × 61 vertices, dt 5 ms, one thread of {machine()} ({os.cpu_count()} CPUs), "
-        f"least of {repeats} runs of {steps} steps; a difference may be negative: without the effect, "
-        'contact moves otherwise. The laws of friction other than Coulomb\'s are priced against his; "once": before '
-        "the first step."
+        f"least of {repeats} runs of {steps} steps. A difference is relative to the step without the effect, and may "
+        "be negative: without it, cloth moves otherwise. The laws of friction other than Coulomb's are priced against "
+        'his; "once": before the first step.'
     )
     README.write_text(f"{head}{BEGIN}\n{intro}\n\n{table(prices)}\n{END}{tail}")
 
