@@ -153,7 +153,7 @@ def run(
 def _measured(
     request: Request, folder: StudyFolder, processes: int | None, limit: float | None, *, progress: bool
 ) -> Study:
-    from clothsim.simulation import progress_bar
+    from clothsim._progress import progress_bar
 
     runner = Runner(
         request.scene, request.base, request.axes, folder, seeds=request.seeds, seed=request.seed,
