@@ -15,7 +15,7 @@ from study_scenes import FALLING, HANGING, RESTING, error, load, study
 
 import clothsim as cs
 from clothsim.errors import InvalidInput
-from clothsim.study import evaluate, pareto, quantities
+from clothsim.study import evaluate, pareto, plots, quantities
 from clothsim.study.axes import axis, parse
 from clothsim.study.elastica import cantilever
 from clothsim.study.job import Request
@@ -118,6 +118,18 @@ def test_orders_leave_out_what_the_reference_cannot_tell() -> None:
     assert pareto.order({0.1: 1.0}, 0.0) is None
     rough = {0.2: 0.5, 0.1: 0.125, 0.05: 0.125 / 4, 0.025: 0.125 / 16, 0.0125: 0.125 / 17}
     assert pareto.order(rough, 0.0) == pytest.approx(2.0), "one plateau does not decide"
+
+
+def test_labels_of_a_plot_leave_out_what_all_tables_share(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    laws = [{"model": "hinge", "rigidity": 1e-5}, {"model": "hinge", "rigidity": 1e-5, "damping": 0.1}]
+    others = [{"model": "nonlinear", "rigidity": 1e-5, "coercive_couple": 1e-4}]
+    request = Request(load(tmp_path, HANGING), {"bending": [*laws, *others], "dt": [0.01, 0.005]})
+    rows = [Row(p, "not run", {}) for p in request.points]
+    made = evaluate.study(request, rows, [({}, Reference("none", "none"))], {"load_before": 0.0}, 1)
+    brief = [plots._brief(made, row.label) for row in rows[::2]]
+    assert brief == ["bending hinge, dt 0.01", "bending hinge (damping 0.1), dt 0.01", "bending nonlinear, dt 0.01"]
+    assert sum(plots._named(k, 40, 9) for k in range(40)) == 9 and all(plots._named(k, 5, 9) for k in range(5))
 
 
 def test_numbers_with_units() -> None:
