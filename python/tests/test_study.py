@@ -200,6 +200,19 @@ def test_measured_orders_are_those_of_the_methods(tmp_path: Path) -> None:
     assert [error(r, "rms") for r in best] == sorted((error(r, "rms") for r in best), reverse=True)
 
 
+def test_memory_is_that_of_the_effects_and_more(tmp_path: Path) -> None:
+    scene = load(tmp_path, HANGING)
+    found = study(scene, {"resolution": [5, 81]}, "energy_drift", fixed={"duration": 5e-3})
+    small, large = found.rows
+    direct = cs.Simulation(cs.Scene(**{**scene.to_dict(), "duration": 5e-3}), threads=1)
+    direct.advance(5e-3)
+    assert small.state_bytes == sum(e["bytes"] for e in direct.report["effects"])
+    # 6561 vertices instead of 25 and 12800 triangles instead of 32; edges and hinges lie between.
+    assert small.state_bytes and large.state_bytes and large.peak_bytes
+    assert 6561 / 25 < large.state_bytes / small.state_bytes < 12800 / 32
+    assert large.peak_bytes > large.state_bytes
+
+
 def test_resolution_converges_and_its_reference_is_finer(tmp_path: Path) -> None:
     scene = load(tmp_path, HANGING.replace("duration = 0.05", "duration = 0.2"))
     found = study(scene, {"resolution": [3, 5, 9]}, "rms", "lowest")
