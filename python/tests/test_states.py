@@ -6,6 +6,7 @@ import json
 import logging
 import re
 import shutil
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from clothsim._files import whole
 from clothsim._run.job import Job, Stopped
 from clothsim._run.sealed import read_sealed, write_sealed
 from clothsim._run.start import Start
-from clothsim._run.states import states_of
+from clothsim._run.states import read_state, states_of
 
 HYSTERESIS = {"fabric": "cotton", "bending": "hysteresis", "plasticity": 0.1, "fatigue": 0.02}
 OUTPUT = {
@@ -247,7 +248,10 @@ def test_damaged_and_foreign_states_are_refused(fallen: Path, tmp_path: Path) ->
     scene = falling()
     path = tmp_path / "a.state"
     content = states_of(fallen)[6].read_bytes()
-    header, body = read_sealed(states_of(fallen)[6])
+    header, body = read_state(states_of(fallen)[6])
+    _, packed = read_sealed(states_of(fallen)[6])
+    assert len(packed) < 0.8 * len(body)
+    unpacked = {key: value for key, value in header.items() if key != "unpacked"}
     cases = [
         (content[: len(content) // 2], "cut off"),
         (content[:20], "cut off|got other bytes"),
@@ -262,10 +266,15 @@ def test_damaged_and_foreign_states_are_refused(fallen: Path, tmp_path: Path) ->
         with pytest.raises(cs.CheckpointError, match=match):
             cs.Simulation.resume(path, scene=scene)
     for facts, engine, match in (
-        (header, body[:8] + b"\x09\0\0\0" + body[12:], "expected version 1 of the state of a frame, got version 9"),
+        (header, packed[:-1], "bytes when unpacked, got others"),
+        ({**header, "unpacked": 2**40}, packed, "expected 1099511627776 bytes when unpacked, got others"),
+        ({**header, "unpacked": -1}, packed, "when unpacked"),
+        ({**header, "unpacked": "many"}, packed, "when unpacked"),
+        ({**header, "unpacked": 2**24}, zlib.compress(bytes(2**26), 9), "when unpacked"),
+        (unpacked, body[:8] + b"\x09\0\0\0" + body[12:], "expected version 1 of the state of a frame, got version 9"),
         ({"frames": 3}, body, "expected the state of a frame, got another file of a run"),
-        (header, cs.Simulation(scene)._core.checkpoint(0), "starts with"),
-        (header, body[:-8] + bytes(8), "checksum"),
+        (unpacked, cs.Simulation(scene)._core.checkpoint(0), "starts with"),
+        (unpacked, body[:-8] + bytes(8), "checksum"),
     ):
         with whole(path) as file:
             write_sealed(file, facts, engine)
@@ -404,4 +413,4 @@ def test_the_command_goes_on_from_a_state(tmp_path: Path, run_cli: RunCli, scene
 
 def test_a_state_read_and_written_has_the_same_bytes(fallen: Path) -> None:
     path = states_of(fallen)[6]
-    assert cs.Simulation.resume(path, scene=falling())._core.frame_state() == read_sealed(path)[1]
+    assert cs.Simulation.resume(path, scene=falling())._core.frame_state() == read_state(path)[1]
