@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 import clothsim as cs
 from clothsim import _core
+from clothsim._logs import step_reports
 from clothsim.errors import (
     IntersectingStart,
     InvalidInput,
@@ -261,7 +262,7 @@ def check(case: dict[str, Any]) -> None:
         _same(one, two, f"step {number}, one and two threads")
         if stops[0] is not None:
             break
-        assert one._step_reports() == number + 1
+        assert step_reports(one._core) == number + 1
         if number == half:
             two = cs.Simulation._from_bytes(two._core.checkpoint(number % 2), 2, "cpu")
             _same(one, two, f"checkpoint after step {number}")

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import logging
-import math
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from clothsim import _core
-from clothsim._arrays import Floats, Ints, floats, number, optional, shape_text
+from clothsim._arrays import Floats, Ints, number
 from clothsim._device import check_device, check_threads
 from clothsim._files import write_whole
-from clothsim._logs import log_step
-from clothsim._scene_facts import contact_thickness, rest_source
-from clothsim.errors import CheckpointError, InvalidInput
+from clothsim._frames import frame_lengths
+from clothsim._logs import EngineLog, step_reports
+from clothsim._progress import progress_bar
+from clothsim._record import record
+from clothsim._scene_facts import bodies_of
+from clothsim._state import Frame, Hinges, Plan
+from clothsim._steering import steering
+from clothsim.errors import CheckpointError
 from clothsim.recording import Body, Recording
 from clothsim.scene import Scene
 
@@ -31,86 +32,6 @@ if TYPE_CHECKING:
 __all__ = ["Frame", "Hinges", "Plan", "Simulation", "record"]
 
 _logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """The state at one moment of a run.
-
-    Attributes
-    ----------
-    index : int
-        Number of the frame; 0 is the state at which the run began.
-    time : float
-        Simulated time [s].
-    positions : (n, 3) float64
-        Positions of all cloth vertices [m].
-    velocities : (n, 3) float64
-        Their velocities [m/s].
-    collider_positions : (k, 3) float64
-        Positions of all collider vertices [m].
-    """
-
-    index: int
-    time: float
-    positions: Floats
-    velocities: Floats
-    collider_positions: Floats
-
-
-class Plan(dict[str, Any]):
-    """Which effects run and why, as the tables of its JSON; ``print`` it for a table to read.
-
-    Parameters
-    ----------
-    tables : dict
-        The plan as ``clothsim plan --json`` prints it.
-    text : str
-        The plan as ``clothsim plan`` prints it.
-    """
-
-    def __init__(self, tables: dict[str, Any], text: str) -> None:
-        super().__init__(tables)
-        self._text = text
-
-    def __str__(self) -> str:
-        return self._text
-
-    def __repr__(self) -> str:
-        return f"Plan(on: {', '.join(self.running)})"
-
-    @property
-    def running(self) -> list[str]:
-        """Names of the effects that run, in the order of the step."""
-        return [effect["name"] for effect in self["effects"] if effect["on"]]
-
-
-@dataclass(frozen=True, eq=False)
-class Hinges:
-    """The shared edges of bending laws that remember, as they stand.
-
-    Attributes
-    ----------
-    vertices : (h, 4) int64
-        Cloth vertices: the shared edge, then the two opposite it.
-    curvature : (h,) float64
-        Change of curvature (θ − θ0)/h̄ against the rest shape [1/m].
-    moment : (h,) float64
-        Moment per width [N].
-    rest_curvature : (h,) float64
-        Curvature about which the hinge rests now [1/m].
-    b1 : (h,) float64
-        Initial rigidity that fatigue has left [N m].
-    frictional_moment : (h,) float64
-        Frictional moment that fatigue has left [N].
-    """
-
-    vertices: Ints
-    curvature: Floats
-    moment: Floats
-    rest_curvature: Floats
-    b1: Floats
-    frictional_moment: Floats
 
 
 class Simulation:
@@ -173,8 +94,7 @@ class Simulation:
             bool(allow_intersections),
             None,
         )
-        self._logged = self._logged_choices = 0
-        self._log_fallbacks()
+        self._log = EngineLog(_logger, self._core)
 
     @classmethod
     def from_frame(
@@ -248,44 +168,8 @@ class Simulation:
     def _over(cls, core: _core.Simulation) -> Simulation:
         simulation = cls.__new__(cls)
         simulation._core = core
-        simulation._logged = sum(f["step"] < core.step_count for f in json.loads(core.fallbacks()))
-        simulation._logged_choices = len(json.loads(core.choices()))
-        simulation._log_fallbacks()
+        simulation._log = EngineLog(_logger, core, resumed=True)
         return simulation
-
-    def _log_fallbacks(self) -> None:
-        """Say once of each GPU that is done without since when, and why."""
-        fallbacks = json.loads(self._core.fallbacks())
-        for f in fallbacks[self._logged :]:
-            _logger.warning(
-                'detector "%s": on the CPU instead of a GPU since step %d: %s: %s',
-                *(f[key] for key in ("detector", "step", "device", "reason")),
-            )
-        self._logged = len(fallbacks)
-
-    def _log_choices(self) -> None:
-        """Say once of each detector that was chosen by measuring since when, and why."""
-        choices = json.loads(self._core.choices())
-        for c in choices[self._logged_choices :]:
-            keys = ("detector", "device", "step", "why")
-            _logger.info('detector "%s" on %s after step %d: %s', *(c[key] for key in keys))
-        self._logged_choices = len(choices)
-
-    def _log_steps(self, first: int) -> None:
-        """Say of each step from number ``first`` on what it took, and what went hard."""
-        for step in json.loads(self._core.steps(first)):
-            log_step(_logger, step)
-
-    @contextlib.contextmanager
-    def _stepping(self) -> Iterator[None]:
-        first = self._step_reports() if _logger.isEnabledFor(logging.INFO) else None
-        try:
-            yield
-        finally:
-            if first is not None:
-                self._log_steps(first)
-            self._log_fallbacks()
-            self._log_choices()
 
     # Stepping --------------------------------------------------------------------------------------------------
 
@@ -299,9 +183,9 @@ class Simulation:
         DeviceError
             ``device="gpu"``, and it gave no answer; the state is the last good one, and the next step asks it again.
         """
-        with self._stepping():
+        with self._log.stepping():
             self._core.step()
-        last: dict[str, Any] = json.loads(self._core.steps(self._step_reports() - 1))[0]
+        last: dict[str, Any] = json.loads(self._core.steps(step_reports(self._core) - 1))[0]
         return last
 
     def advance(self, seconds: float) -> None:
@@ -321,12 +205,12 @@ class Simulation:
         KeyboardInterrupt
             Between two steps; `finish_advance` (also after a checkpoint) does the rest with the same steps.
         """
-        with self._stepping():
+        with self._log.stepping():
             self._core.advance(number(seconds, "seconds", "a finite number ≥ 0 [s]"))
 
     def finish_advance(self) -> None:
         """Do what an interrupted `advance` has left, to the same bits as without the interruption."""
-        with self._stepping():
+        with self._log.stepping():
             self._core.finish_advance()
 
     def steer(
@@ -371,19 +255,7 @@ class Simulation:
         [0.0, 0.1, 0.0]
         """
         names = [table["name"] for table in json.loads(self._core.scene())["cloth"]]
-        if cloth not in names:
-            expected = f"one of {', '.join(map(repr, names)) or 'no cloth'}"
-            raise InvalidInput(f"cloth: expected {expected}, got {cloth!r}", name="cloth", expected=expected)
-        if not isinstance(pin, int) or pin < 0:
-            raise InvalidInput(f"pin: expected the number of a pin, got {pin!r}", name="pin")
-        turn = None
-        if rotation is not None:
-            if not isinstance(rotation, Mapping) or set(rotation) - {"axis", "angle"} or "angle" not in rotation:
-                raise InvalidInput(f"rotation: expected axis and angle, got {rotation!r}", name="rotation")
-            axis = _three(rotation.get("axis", (0.0, 1.0, 0.0)), "rotation.axis")
-            turn = (axis, number(rotation["angle"], "rotation.angle", "a number [rad]"))
-        pause = number(seconds, "seconds", "a finite number > 0 [s]")
-        self._core.steer(names.index(cloth), pin, _three(position, "position"), turn, pause)
+        self._core.steer(*steering(names, cloth, pin, position, rotation, seconds))
 
     def run(self, seconds: float | None = None, fps: float = 60.0, progress: bool = True) -> Iterator[Frame]:
         """Yield the state now and then ``fps`` times per simulated second.
@@ -480,16 +352,7 @@ class Simulation:
     @property
     def bodies(self) -> list[Body]:
         """Names and meshes of all bodies, cloth first, in scene order."""
-        scene = json.loads(self._core.scene())
-        moving = {c["name"] for c in scene["collider"] if c.get("keyframes") or c.get("sequence")}
-        rests = {c["name"]: rest_source(scene, c) for c in scene["cloth"]}
-        bodies = []
-        for name, kind, (first, last), (_, triangles, uv) in self._core.bodies():
-            if kind == "cloth":
-                bodies.append(Body(name, "cloth", last - first, triangles, uv, rest=rests[name]))
-            else:
-                bodies.append(Body(name, "collider", last - first, triangles, uv, name not in moving))
-        return bodies
+        return bodies_of(self._core)
 
     @property
     def hinges(self) -> Hinges:
@@ -523,9 +386,6 @@ class Simulation:
         report["steps"] = json.loads(self._core.steps(0))
         return report
 
-    def _step_reports(self) -> int:
-        return int(json.loads(self._core.summary())["totals"]["steps"])
-
     # Checkpoints -----------------------------------------------------------------------------------------------
 
     def save_checkpoint(self, path: str | os.PathLike[str], *, steps: bool = True) -> None:
@@ -539,7 +399,7 @@ class Simulation:
             Write the table of each step too. They grow with the run; without them, a simulation that goes on from here
             has the totals of all steps and the tables of the later ones.
         """
-        write_whole(Path(path), self._core.checkpoint(0 if steps else self._step_reports()))
+        write_whole(Path(path), self._core.checkpoint(0 if steps else step_reports(self._core)))
 
     @classmethod
     def resume(
@@ -600,96 +460,3 @@ def _checked(scene: Scene) -> Scene:
     if not isinstance(scene, Scene):
         raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
     return scene
-
-
-def _three(value: ArrayLike, name: str) -> tuple[float, float, float]:
-    array = floats(value, name, "shape (3,)")
-    if array.shape != (3,):
-        raise InvalidInput(f"{name}: expected shape (3,), got {shape_text(array)}", name=name)
-    return (float(array[0]), float(array[1]), float(array[2]))
-
-
-def frame_lengths(seconds: float, fps: float) -> list[float]:
-    """Time from each frame to the next [s]: 1/fps, the last one shorter where ``seconds`` ends within a frame."""
-    rounding = 1e-9  # a whole number of frames but for rounding makes no extra frame
-    for name, value in (("seconds", seconds), ("fps", fps)):
-        if not (math.isfinite(value) and (value > 0.0 if name == "fps" else value >= 0.0)):
-            expected = "a finite number > 0 [1/s]" if name == "fps" else "a finite number ≥ 0 [s]"
-            raise InvalidInput(
-                f"{name}: expected {expected}, got {value}", name=name, expected=expected, got=str(value)
-            )
-    count = math.ceil(seconds * fps - rounding)
-    lengths = [1.0 / fps] * count
-    whole = math.floor(seconds * fps + rounding)
-    if count > whole:
-        lengths[-1] = seconds - whole / fps
-    return lengths
-
-
-def progress_bar(total: int, *, initial: int = 0, enabled: bool = True, name: str = "") -> Any:
-    """Return a bar with an estimate of the time left, on stderr."""
-    tqdm = optional("tqdm", extra="all", purpose="showing progress")
-    return tqdm.tqdm(
-        total=total, initial=initial, disable=not enabled, unit="frame", desc=name or None, dynamic_ncols=True
-    )
-
-
-def record(
-    simulation: Simulation, seconds: float | None = None, fps: float = 60.0, *, progress: bool = True
-) -> Recording:
-    """Run a simulation and keep its frames, to save, render or look at.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Where to go on from.
-    seconds, fps, progress
-        As for `Simulation.run`.
-
-    Returns
-    -------
-    Recording
-
-    Examples
-    --------
-    >>> import clothsim as cs
-    >>> scene = cs.Scene(duration=0.1)
-    >>> scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 6, 6), "cotton", pins=[{"vertices": [0, 5]}])
-    >>> cs.record(cs.Simulation(scene), fps=20, progress=False)
-    Recording(3 frames of cloth, 0 s to 0.1 s)
-    """
-    bodies = simulation.bodies
-    if simulation.time > 0.0:  # the first frame is not the scene's start
-        bodies = [replace(body, rest=None) if body.rest == "start" else body for body in bodies]
-    scene = json.loads(simulation._core.scene())
-    rows, times, velocities = [], [], []
-    standing = standing_positions(bodies, simulation.collider_positions)
-    for frame in simulation.run(seconds, fps, progress):
-        rows.append(moving_positions(bodies, frame.positions, frame.collider_positions))
-        times.append(frame.time)
-        velocities.append(frame.velocities)
-    return Recording(
-        bodies, np.array(times), np.array(rows), standing,
-        velocities=np.array(velocities), fps=fps, up=scene["up"], name=scene["name"],
-        thickness=contact_thickness(scene),
-    )  # fmt: skip
-
-
-def moving_positions(bodies: list[Body], cloth: Floats, colliders: Floats) -> Floats:
-    """Positions of what is not static: all cloth, then the colliders that move."""
-    return np.concatenate([cloth, *_collider_parts(bodies, colliders, static=False)])
-
-
-def standing_positions(bodies: list[Body], colliders: Floats) -> Floats:
-    """Positions of the colliders that stand still."""
-    return np.concatenate([np.zeros((0, 3)), *_collider_parts(bodies, colliders, static=True)])
-
-
-def _collider_parts(bodies: list[Body], positions: Floats, *, static: bool) -> list[Floats]:
-    parts, first = [], 0
-    for body in bodies:
-        if body.kind == "collider":
-            if body.static == static:
-                parts.append(positions[first : first + body.vertex_count])
-            first += body.vertex_count
-    return parts

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from view_runs import falling
 
 import clothsim as cs
+from clothsim._progress import progress_bar
 from clothsim._run.job import Job
 from clothsim._run.start import Start
 from clothsim._view.colours import MAPS, colour_map, nice_ceiling, table
 from clothsim._view.fields import REACH, Fields, principal_strain
 from clothsim._view.pack import pack, residuals, restored, rigid_motion
 from clothsim.recording import flattened
-from clothsim.simulation import progress_bar
 
 
 def turned(x: NDArray[np.float64]) -> NDArray[np.float64]:

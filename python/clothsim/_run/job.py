@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from clothsim._device import check_device
+from clothsim._frames import frame_lengths, moving_positions, standing_positions
+from clothsim._progress import progress_bar
 from clothsim._run.digests import array_digest, digest
 from clothsim._run.facts import FrameFacts
 from clothsim._run.folder import RunFolder
@@ -35,7 +37,7 @@ from clothsim.errors import (
 )
 from clothsim.recording import Recording
 from clothsim.scene import Scene
-from clothsim.simulation import Simulation, frame_lengths, moving_positions, progress_bar, standing_positions
+from clothsim.simulation import Simulation
 
 __all__ = ["Finished", "Job", "Stopped"]
 

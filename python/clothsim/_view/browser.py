@@ -16,13 +16,13 @@ import numpy as np
 from clothsim._arrays import Floats
 from clothsim._export.studio import body_colours, is_backdrop, subject
 from clothsim._files import write_whole
+from clothsim._progress import progress_bar
 from clothsim._view.fields import Fields
 from clothsim._view.pack import Packed, pack
 from clothsim._view.source import Source
 from clothsim._view.stage import Camera
 from clothsim.errors import InvalidInput
 from clothsim.recording import Recording
-from clothsim.simulation import progress_bar
 
 __all__ = ["Page", "thinned", "write"]
 

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from clothsim._arrays import optional
 from clothsim._files import replacing, whole_folder, write_whole
+from clothsim._progress import progress_bar
 from clothsim._view.fields import Fields
 from clothsim._view.overlay import annotated
 from clothsim._view.source import Source
 from clothsim._view.stage import Camera, Stage
 from clothsim.errors import InvalidInput, OutputError
 from clothsim.recording import Recording
-from clothsim.simulation import progress_bar
 
 __all__ = ["FILM_SUFFIXES", "STILL_SUFFIXES", "film_frames", "write_film", "write_still"]
 

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from clothsim._arrays import Floats
+from clothsim._frames import moving_positions, standing_positions
 from clothsim.mesh import Mesh
 from clothsim.recording import Body
 from clothsim.reproduce import residual
 from clothsim.reproduce.friction_laws import GRAVITY, LAWS, Coefficients, Slide, slide
 from clothsim.scene import Scene
-from clothsim.simulation import Simulation, moving_positions, standing_positions
+from clothsim.simulation import Simulation
 
 __all__ = ["ORDER", "Cards", "Run", "run"]
 

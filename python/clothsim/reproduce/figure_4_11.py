@@ -10,13 +10,14 @@ import numpy as np
 
 from clothsim import bending
 from clothsim._arrays import Floats
+from clothsim._frames import moving_positions, standing_positions
 from clothsim.mesh import Mesh
 from clothsim.recording import Body
 from clothsim.reproduce import pictures
 from clothsim.reproduce.contract import Check, Effort, Table
 from clothsim.reproduce.kes import CURVATURE, Loop
 from clothsim.scene import Scene
-from clothsim.simulation import Simulation, moving_positions, standing_positions
+from clothsim.simulation import Simulation
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
 

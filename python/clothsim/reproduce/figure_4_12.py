@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from clothsim._arrays import Floats, Ints
+from clothsim._frames import moving_positions, standing_positions
 from clothsim.recording import Body
 from clothsim.reproduce import mannequin, pictures, residual
 from clothsim.reproduce.contract import Check, Effort, Table
 from clothsim.reproduce.kes import Loop
 from clothsim.scene import Scene
-from clothsim.simulation import Simulation, moving_positions, standing_positions
+from clothsim.simulation import Simulation
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
 

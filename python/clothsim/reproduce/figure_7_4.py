@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from clothsim._arrays import Floats
+from clothsim._frames import moving_positions, standing_positions
 from clothsim.recording import Body
 from clothsim.reproduce import mannequin, pictures, residual
 from clothsim.reproduce.contract import Check, Effort, Table
 from clothsim.reproduce.friction_laws import COLOURS, GRAVITY, TABLE_7_1
 from clothsim.reproduce.wrinkles import Wrinkles
 from clothsim.scene import Scene
-from clothsim.simulation import Simulation, moving_positions, standing_positions
+from clothsim.simulation import Simulation
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
 

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from clothsim._arrays import Floats
+from clothsim._frames import moving_positions
 from clothsim.mesh import Mesh
 from clothsim.recording import Body
 from clothsim.reproduce import pictures, residual
 from clothsim.reproduce.contract import Check, Effort, Table
 from clothsim.reproduce.friction_laws import COLOURS, GRAVITY, LAWS, TABLE_7_1
 from clothsim.scene import Scene
-from clothsim.simulation import Simulation, moving_positions
+from clothsim.simulation import Simulation
 
 __all__ = ["THESIS", "checks", "draw", "here", "measure", "parameters", "tables"]
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from clothsim._arrays import Floats, Ints
+from clothsim._frames import moving_positions, standing_positions
 from clothsim.recording import Body
 from clothsim.reproduce import pictures
 from clothsim.reproduce.contract import Check, Table
 from clothsim.scene import Scene
-from clothsim.simulation import Simulation, moving_positions, standing_positions
+from clothsim.simulation import Simulation
 
 __all__ = ["Run", "checks", "draw", "fabric", "folds", "here", "run", "tables"]
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-from clothsim.simulation import progress_bar
+from clothsim._progress import progress_bar
 from clothsim.stability import outputs as files
 from clothsim.stability.atlas import Atlas, Cell, Map, Request, engine_digest
 from clothsim.study import machine

@@ -111,7 +111,7 @@ def tune(
     OutputExists, CheckpointError
         The folder holds a study already, or another one.
     """
-    from clothsim.simulation import progress_bar
+    from clothsim._progress import progress_bar
 
     started = time.monotonic()
     axes = _axes(based(scene, fixed or {}), vary)

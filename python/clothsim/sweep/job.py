@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from clothsim._files import write_whole
+from clothsim._progress import progress_bar
 from clothsim.errors import ClusterError, InvalidInput
-from clothsim.simulation import progress_bar
 from clothsim.study import machine
 from clothsim.study.points import label
 from clothsim.sweep import tables
