@@ -180,10 +180,12 @@ def test_an_interrupted_run_has_the_same_states(fallen: Path, tmp_path: Path) ->
     assert sorted(states_of(out)) == [0, 3, 6]
     assert cs.Simulation.from_frame(scene, out, 6).time == pytest.approx(0.15)
     (out / ".clothsim/states/000009.state").write_bytes(b"of a step that a crash has undone")
+    (out / ".clothsim/states/.000012.99.part.state").write_bytes(b"cut off")
     Job(scene, out, progress=False, resume=True).run()
     assert {f: p.read_bytes() for f, p in states_of(out).items()} == {
         f: p.read_bytes() for f, p in states_of(fallen).items()
     }
+    assert len(list((out / "states").iterdir())) == 5
     assert not (out / ".clothsim").exists()
 
 

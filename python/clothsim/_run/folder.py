@@ -69,7 +69,7 @@ class RunFolder:
         """Hold the folder for this process; the lock goes with it, however it ends."""
         handle = self._open_lock()
         try:
-            for folder in (self.out, self.work):
+            for folder in (self.out, self.work, self.work / STATES):
                 remove_parts(folder)
             if self._done.exists():  # killed while it was being removed
                 self._remove_finished()
