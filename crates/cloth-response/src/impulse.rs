@@ -79,8 +79,10 @@ pub(crate) struct Contact<S> {
     pub(crate) friction: S,
     /// On the first point, without the push [N s].
     pub(crate) impulse: Vec3,
-    /// What the push adds to it, with the friction of the push [N s].
-    pub(crate) push: Vec3,
+    /// What the push adds to its normal part [N s].
+    pub(crate) push: f64,
+    /// Friction of the push [N s].
+    rub: Vec3,
 }
 
 impl<S: Copy> Contact<S> {
@@ -101,7 +103,8 @@ impl<S: Copy> Contact<S> {
             law,
             friction,
             impulse: Vec3::zeros(),
-            push: Vec3::zeros(),
+            push: 0.0,
+            rub: Vec3::zeros(),
         })
     }
 
@@ -134,26 +137,23 @@ impl<S: Copy> Contact<S> {
         kept: &[Vec3],
     ) -> (Vec3, f64) {
         let u = self.relative(velocity);
-        let (v_n, carried, pushed) =
-            (self.normal.dot(&u), self.normal.dot(&self.impulse), self.normal.dot(&self.push));
-        let lambda = carried + pushed;
+        let (v_n, carried) = (self.normal.dot(&u), self.normal.dot(&self.impulse));
+        let lambda = carried + self.push;
         let by = self.law.impulse(lambda, v_n, self.mass, carried) - lambda;
-        let mut change = self.normal * by;
-        let tangential = self.push - self.normal * pushed;
-        let most = kernel.at_rest(&self.friction) * (pushed + by).max(0.0);
-        let most = if self.law.rubs { most } else { 0.0 };
-        if most > 0.0 || tangential != Vec3::zeros() {
-            let slip = u - self.relative(kept);
-            let wanted = tangential - (slip - self.normal * self.normal.dot(&slip)) * self.mass;
-            change += into_cone(wanted, most) - tangential;
+        if !self.law.rubs {
+            return (self.normal * by, by.abs() / self.mass);
         }
+        let most = kernel.at_rest(&self.friction) * (self.push + by).max(0.0);
+        let slip = u - self.relative(kept);
+        let wanted = self.rub - (slip - self.normal * self.normal.dot(&slip)) * self.mass;
+        let change = self.normal * by + (into_cone(wanted, most) - self.rub);
         (change, change.norm() / self.mass)
     }
 
     /// Whether the whole law asks for more than the impulse gives, by more than `tolerance` [m/s].
     pub(crate) fn wants_push(&self, velocity: &[Vec3], tolerance: f64) -> bool {
         let carried = self.normal.dot(&self.impulse);
-        let lambda = carried + self.normal.dot(&self.push);
+        let lambda = carried + self.push;
         let v_n = self.normal.dot(&self.relative(velocity));
         self.law.elastic(carried) > lambda && self.law.cap > v_n + tolerance
     }
@@ -161,7 +161,15 @@ impl<S: Copy> Contact<S> {
     /// Books a change of the impulse, or of the push; `change` hears of each vertex and the change of its velocity.
     #[inline]
     pub(crate) fn apply(&mut self, by: Vec3, push: bool, mut change: impl FnMut(usize, Vec3)) {
-        *(if push { &mut self.push } else { &mut self.impulse }) += by;
+        if push {
+            let along = self.normal.dot(&by);
+            self.push += along;
+            if self.law.rubs {
+                self.rub += by - self.normal * along;
+            }
+        } else {
+            self.impulse += by;
+        }
         for k in 0..4 {
             if self.share[k] != 0.0 {
                 change(self.vertices[k] as usize, by * self.share[k]);
@@ -317,13 +325,13 @@ mod tests {
             let inelastic = contact.impulse;
             assert!(contact.relative(&kept).y.abs() < ROUNDING && contact.wants_push(&kept, 1e-6));
             let mut moved = kept;
-            let (change, _) = contact.push_correction(&moved);
+            let (change, _) = contact.push_correction(&Coulomb::default(), &moved, &kept);
             contact.apply(change, true, |v, by| moved[v] += by);
             assert!((contact.relative(&moved).y - 0.01).abs() < ROUNDING && contact.push > 0.0);
             assert!(!contact.wants_push(&moved, 1e-6));
             assert_eq!(contact.impulse, inelastic);
             assert!(contact.correction(&Coulomb::default(), &kept).1 < ROUNDING);
-            assert!(contact.push_correction(&moved).1 < ROUNDING);
+            assert!(contact.push_correction(&Coulomb::default(), &moved, &kept).1 < ROUNDING);
             let slip = |v: &[Vec3]| contact.relative(v) - contact.normal * contact.relative(v).y;
             assert!((slip(&moved) - slip(&kept)).norm() < ROUNDING);
         }

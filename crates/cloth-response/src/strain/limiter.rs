@@ -117,8 +117,7 @@ impl Limiter {
         motion: &Motion<'_>,
         info: &mut ResponseInfo,
     ) {
-        let acts =
-            |contact: &Contact<K::State>| contact.impulse != Vec3::zeros() || contact.push != Vec3::zeros();
+        let acts = |contact: &Contact<K::State>| contact.impulse != Vec3::zeros() || contact.push != 0.0;
         let loaded = |slot: &u32| *slot != NONE && acts(set.contact(*slot));
         info.limited_edges = self.contacts.iter().filter(|slots| slots.iter().any(loaded)).count();
         for edge in &self.edges {
