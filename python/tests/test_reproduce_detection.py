@@ -15,8 +15,9 @@ import clothsim as cs
 from clothsim import collision
 from clothsim._cli import main
 from clothsim._data import VARIABLE
-from clothsim.reproduce import Effort, benchmarks, counting, knots
+from clothsim.reproduce import Effort, benchmarks, counting, knots, snapshots
 from clothsim.reproduce.benchmarks import Benchmark, Suite
+from clothsim.reproduce.snapshots import Shot, Shown
 
 ARRAYS = ("vertex_triangle", "time_vertex_triangle", "edge_edge", "time_edge_edge")
 QUICK = Effort(quick=True, threads=2)
@@ -234,6 +235,70 @@ def test_table_6_1_sees_registrations_in_the_wrong_levels() -> None:
     ]
     assert of({3: 20.0, 6: 40.0, 8: 40.0}) == ["three neighbouring levels have over 85 % of the registrations"]
     assert len(of({6: 1.0}, differing=2)) == 1
+
+
+def test_figure_5_16_compares_tests_not_times() -> None:
+    from clothsim.reproduce import figure_5_16 as figure
+    from clothsim.reproduce.timings import MODES, Times
+
+    def of(factor: float, seconds: float, name: str = "Funnel", **timed: float) -> list[str]:
+        stages = {"bounds": 1.0, "sort": 1.0, "gather": 1.0, "workload": 1.0}
+        virtual = replace(counted(1e6), seconds=stages)
+        grid = replace(counted(factor * 1e6), seconds={**stages, "bounds": seconds, **timed})
+        counts = {(name, m, mode): c for m, c in ((counting.GRID, grid), (counting.VIRTUAL, virtual)) for mode in MODES}
+        return failing(figure.checks(Times(planted((name,)), 0, counts)))
+
+    fewer = "fewer tests than the uniform grid, DCD and CCD, each benchmark but the knots"
+    assert of(12.0, 1.0) == of(12.0, 0.1) == []
+    assert of(0.9, 9.0) == [fewer]
+    assert of(0.9, 9.0, "Bowline (generated)") == []
+    assert of(12.0, 1.0, sort=-1.0) == ["each stage was timed"]
+
+
+# Snapshots ----------------------------------------------------------------------------------------------------------
+
+
+def shown(x: Any, triangles: Any, thesis: str, *, contacts: int = 1, passing: int = 0, quick: bool = False) -> Shown:
+    benchmark = Benchmark("planted", thesis, benchmarks.GENERATED, np.array(triangles), ((np.array(x), np.array(x)),))
+    shot = Shot(benchmark, 0, contacts, 0, passing)
+    return Shown(Suite((benchmark,), (), "", quick), (thesis,), (shot,))
+
+
+def test_snapshots_see_unfit_benchmarks() -> None:
+    sheet = cs.Mesh.grid(1.0, 1.0, 101, 101)  # 20,000 triangles of one size
+    fit = shown(sheet.vertices, sheet.triangles, "Reef knot")
+    assert failing(fit.checks()) == []
+    few = shown(sheet.vertices, sheet.triangles[:18_999], "Reef knot")
+    assert failing(few.checks()) == ["planted: thousands of triangles"]
+    assert failing(replace(few, suite=replace(few.suite, is_quick=True)).checks()) == []
+    bad = shown(sheet.vertices, sheet.triangles, "Reef knot", contacts=0, passing=1)
+    assert failing(bad.checks()) == [
+        "pairs of triangles that intersect at the start of a generated step", "each has contacts in its last step"
+    ]  # fmt: skip
+    assert shown(sheet.vertices, sheet.triangles, "Funnel").differing_sizes().passed is False
+    assert fit.crowded().passed is False
+
+
+def test_uneven_triangles_are_measured() -> None:
+    # Ten of one size far apart, five times; then a tenth place with a hundred of them.
+    one = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    far = [one + [20.0 * k, 0.0, 0.0] for k in range(9)] + [one + [200.0, 0.0, 0.0]] * 91
+    shot = shown(np.concatenate(far), np.arange(300).reshape(-1, 3), "Funnel").shots[0]
+    assert shot.uneven_places == pytest.approx(91.0)
+    assert shot.uneven_sizes == pytest.approx(1.0)
+    wide = shown(np.concatenate([*far[:4], 5.0 * one]), np.arange(15).reshape(-1, 3), "Funnel").shots[0]
+    assert wide.uneven_sizes == pytest.approx(25.0)
+    assert wide.edge == pytest.approx(1.0)
+
+
+def test_pieces_are_the_connected_ones() -> None:
+    moving = knots.reef(120, steps=1)
+    pieces = snapshots._pieces(moving.triangles, len(moving.steps[0][0]))
+    half = len(pieces) // 2
+    assert pieces.tolist() == [0] * half + [1] * half
+    # One long piece whose numbering runs against its order.
+    strip = np.array([[9 - k, 8 - k, 7 - k] for k in (0, 6, 2, 4, 1, 7, 3, 5)])
+    assert set(snapshots._pieces(strip, 10)) == {0}
 
 
 # Files --------------------------------------------------------------------------------------------------------------

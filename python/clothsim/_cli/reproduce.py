@@ -73,13 +73,15 @@ def _text(outcome: Outcome) -> str:
 def _listing() -> str:
     lines: list[str] = []
     paper = ""
+    wide = max(len(entry.name) for entry in CATALOGUE) + 2
+    state = max(len(entry.state) for entry in CATALOGUE) + 2
     for entry in CATALOGUE:
         if entry.paper != paper:
             paper = entry.paper
             lines += ["", paper] if lines else [paper]
-        lines.append(f"  {entry.name:<14}{entry.state:<12}{entry.title}")
+        lines.append(f"  {entry.name:<{wide}}{entry.state:<{state}}{entry.title}")
         if entry.command:
-            lines.append(f"  {'':<26}{entry.command}")
+            lines.append(f"  {'':<{wide + state}}{entry.command}")
     counts: dict[str, int] = {}
     for entry in CATALOGUE:
         counts[entry.state] = counts.get(entry.state, 0) + 1

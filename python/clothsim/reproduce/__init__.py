@@ -8,6 +8,8 @@
 | `kes` | the thesis's units, its fabrics |
 | `benchmarks` | the scenes of chapters 5 and 6: data, and meshes in motion (`moving`) made by `knots` and `pushed` |
 | `counting`, `timings` | what detection on a GPU takes on them |
+| `snapshots` | these scenes in pictures, and what makes them hard |
+| `whole_steps` | steps that the engine does not cut, so that a path is known at each |
 | `pictures` | one style for plots and rendered tiles |
 | `figure_…`, `table_…` | one figure or table each |
 

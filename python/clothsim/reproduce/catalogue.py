@@ -11,7 +11,7 @@ from typing import cast
 from clothsim.errors import InvalidInput
 from clothsim.reproduce.contract import Reproduction
 
-__all__ = ["CATALOGUE", "DRAWING", "NOT_YET", "PHOTOGRAPH", "REPRODUCED", "Entry", "find"]
+__all__ = ["CATALOGUE", "DRAWING", "INPUT", "PHOTOGRAPH", "REPRODUCED", "Entry", "find"]
 
 THESIS = "Wong 2014"
 SKIPPING = "Wong 2010"
@@ -20,7 +20,6 @@ REPRODUCED = "reproduced"
 DRAWING = "drawing"
 PHOTOGRAPH = "photograph"
 INPUT = "input"
-NOT_YET = "not yet"
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class Entry:
         What it shows.
     state : str
         ``"reproduced"``; ``"drawing"``, ``"photograph"`` or ``"input"`` (parameters, data sheets) where there is
-        nothing to measure; ``"not yet"``.
+        nothing to measure.
     module : str
         The module that reproduces it.
     """
@@ -48,7 +47,7 @@ class Entry:
     kind: str
     number: str
     title: str
-    state: str = NOT_YET
+    state: str
     module: str = ""
 
     @property
@@ -85,11 +84,7 @@ class Entry:
         """
         if self.state != REPRODUCED:
             known = ", ".join(entry.name for entry in CATALOGUE if entry.state == REPRODUCED)
-            why = (
-                "is not reproduced yet"
-                if self.state == NOT_YET
-                else f"is {_ARTICLE[self.state]}: there is nothing to measure"
-            )
+            why = f"is {_ARTICLE[self.state]}: there is nothing to measure"
             expected = f"a figure or table that is reproduced ({known})"
             raise InvalidInput(
                 f"FIGURE: {self.kind} {self.number} of {self.paper} {why}; reproduced are {known}",
@@ -108,12 +103,12 @@ class Entry:
 _ARTICLE = {DRAWING: "a drawing", PHOTOGRAPH: "a photograph", INPUT: "what an experiment was given"}
 
 
-def _thesis(number: str, title: str, state: str = NOT_YET, *, module: str = "", kind: str = "figure") -> Entry:
-    return Entry(THESIS, kind, number, title, REPRODUCED if module else state, module)
+def _thesis(number: str, title: str, state: str = REPRODUCED, *, module: str = "", kind: str = "figure") -> Entry:
+    return Entry(THESIS, kind, number, title, state, module)
 
 
-def _skipping(number: str, title: str, state: str = NOT_YET, *, module: str = "", kind: str = "figure") -> Entry:
-    return Entry(SKIPPING, kind, number, title, REPRODUCED if module else state, module)
+def _skipping(number: str, title: str, state: str = REPRODUCED, *, module: str = "", kind: str = "figure") -> Entry:
+    return Entry(SKIPPING, kind, number, title, state, module)
 
 
 CATALOGUE = (
@@ -137,7 +132,7 @@ CATALOGUE = (
     _thesis("4.13", "Cloth clamped n times by two planes, then hung, two bending laws", module="figure_4_13"),
     _thesis("4.14", "Fatigue of one bending element on the fold, cycle by cycle", module="figure_4_14"),
     _thesis("4.1", "Running time and share of the bending component", module="table_4_1", kind="table"),
-    _thesis("5.1", "The reef knot benchmark"),
+    _thesis("5.1", "The reef knot benchmark", module="figure_5_1"),
     _thesis("5.2", "Some well known triangle subdivision rules", DRAWING),
     _thesis("5.3", "Shorten the trajectory of the triangle", DRAWING),
     _thesis("5.4", "A new triangle ID list", DRAWING),
@@ -146,13 +141,13 @@ CATALOGUE = (
     _thesis("5.7", "Most duplicate registrations are removed", DRAWING),
     _thesis("5.8", "Duplicate tests introduced by the virtual subdivision scheme", DRAWING),
     _thesis("5.9", "The workload distribution scheme", DRAWING),
-    _thesis("5.10", "Benchmarks used for performance measuring"),
-    _thesis("5.11", "The flamenco benchmark"),
+    _thesis("5.10", "Benchmarks used for performance measuring", module="figure_5_10"),
+    _thesis("5.11", "The flamenco benchmark", module="figure_5_11"),
     _thesis("5.12", "Broad phase tests for the cloth on ball benchmark with varying λ", module="figure_5_12"),
     _thesis("5.13", "Data of newly created child triangles for continuous collision detection", module="figure_5_13"),
     _thesis("5.14", "Broad phase tests: virtual subdivision against a traditional uniform grid", module="figure_5_14"),
     _thesis("5.15", "Time ratio of steps for N-body benchmark", module="figure_5_15"),
-    _thesis("5.16", "Performance: virtual subdivision against a traditional uniform grid"),
+    _thesis("5.16", "Performance: virtual subdivision against a traditional uniform grid", module="figure_5_16"),
     _thesis("5.1", "The average timings of the virtual subdivision scheme method", module="table_5_1", kind="table"),
     _thesis("5.2", "Specifications of three different graphics cards", INPUT, kind="table"),
     _thesis("6.1", "A uniform subdivision technique and a non-uniform subdivision technique", DRAWING),
@@ -162,8 +157,8 @@ CATALOGUE = (
     _thesis("6.5", "The limitation of a simple bottom-up scheme", DRAWING),
     _thesis("6.6", "A 1D example of the two-stage scheme", DRAWING),
     _thesis("6.7", "The pipeline of the CD algorithm", DRAWING),
-    _thesis("6.8", "Benchmarks used for performance measuring"),
-    _thesis("6.9", "The reef knot benchmark for performance measuring"),
+    _thesis("6.8", "Benchmarks used for performance measuring", module="figure_6_8"),
+    _thesis("6.9", "The reef knot benchmark for performance measuring", module="figure_6_9"),
     _thesis("6.10", "Average number of broad phase tests in several methods", module="figure_6_10"),
     _thesis("6.11", "Time proportions of each step for cloth on ball benchmark", module="figure_6_11"),
     _thesis("6.1", "The octree grid data", module="table_6_1", kind="table"),

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ import numpy as np
 from clothsim._arrays import Floats, Ints
 from clothsim.mesh import Mesh
 from clothsim.recording import Body
+from clothsim.reproduce import whole_steps
 from clothsim.reproduce.kes import Loop
 from clothsim.scene import Scene
 from clothsim.simulation import Simulation
@@ -76,7 +79,8 @@ class Specimen:
         Curvature, moment, rest curvature [1/m, N, 1/m], b1 [N m] and frictional moment [N] of the hinges across the
         fold.
     path : (steps, hinges) float64
-        Their curvature after each step up to the last time the planes are lifted [1/m].
+        Their curvature after each step that the engine took up to the last time the planes are lifted [1/m]; of a
+        strip that is ``followed``.
     place : (hinges,) float64
         Where they are along the strip [m].
     hung : (n, 3) float64 or None
@@ -122,28 +126,37 @@ def parameters(setup: Setup) -> dict[str, Any]:
     return {**FABRIC.named(), **chosen, "chosen": "all but b1, b2, c1, lambda, mu: the thesis does not state them"}
 
 
-def clamp(model: str, cycles: int, setup: Setup, *, hang: bool, tick: Any = None) -> Specimen:
-    """Simulate one strip; ``tick()`` is called after each cycle."""
+def clamp(model: str, cycles: int, setup: Setup, *, hang: bool, followed: bool = False, tick: Any = None) -> Specimen:
+    """Simulate one strip; ``tick()`` is called after each cycle.
+
+    ``followed``: keep the path of its hinges' curvature, and take each step whole (`whole_steps`), so that no turn of
+    it is missed.
+    """
     scene = _scene(model, cycles, setup)
     simulation = Simulation(scene, threads=1)
     ids, place = _across_the_fold(simulation, setup)
     clamped: list[dict[str, Floats]] = []
     lifted: list[dict[str, Floats]] = []
     path: list[Floats] = []
+    with TemporaryDirectory() as folder:
 
-    def go(seconds: float) -> None:
-        for _ in range(round(seconds / setup.dt)):
-            simulation.step()
-            path.append(simulation.hinges.curvature[ids])
+        def go(simulation: Simulation, seconds: float) -> Simulation:
+            count = round(seconds / setup.dt)
+            if followed:
+                file = Path(folder) / "stretch"
+                return whole_steps.advance(simulation, count, setup.dt, lambda s: s.hinges.curvature[ids], path, file)
+            for _ in range(count):
+                simulation.step()
+            return simulation
 
-    go(setup.fold_time)
-    for _ in range(cycles):
-        go(setup.lower_time)
-        clamped.append(_state(simulation, ids))
-        go(setup.clamped_time + setup.lift_time)
-        lifted.append(_state(simulation, ids))
-        if tick is not None:
-            tick()
+        simulation = go(simulation, setup.fold_time)
+        for _ in range(cycles):
+            simulation = go(simulation, setup.lower_time)
+            clamped.append(_state(simulation, ids))
+            simulation = go(simulation, setup.clamped_time + setup.lift_time)
+            lifted.append(_state(simulation, ids))
+            if tick is not None:
+                tick()
     hung = None
     if hang:
         simulation.advance(setup.hang_time)

@@ -210,13 +210,19 @@ def shares(seconds: Mapping[str, float], groups: Mapping[str, Sequence[str]]) ->
 METHODS = {GRID: "#c9c5be", VIRTUAL: "#2f5d8c", SINGLE: "#c08a2e", OCTREE: "#9c2f35"}
 
 
-def bars(axis: Any, suite: Suite, counts: Mapping[tuple[str, str], Counted], methods: Sequence[str]) -> None:
-    """Tests of each method on each benchmark, on a logarithmic axis."""
+def bars(
+    axis: Any,
+    suite: Suite,
+    counts: Mapping[tuple[str, str], Counted],
+    methods: Sequence[str],
+    of: Callable[[Counted], float] = lambda counted: counted.tests,
+) -> None:
+    """Tests (or another number) of each method on each benchmark, on a logarithmic axis."""
     width = 0.8 / len(methods)
     for number, method in enumerate(methods):
-        tests = [counts[b.name, method].tests for b in suite.benchmarks]
-        places = np.arange(len(tests)) + (number - 0.5 * (len(methods) - 1)) * width
-        axis.bar(places, tests, 0.94 * width, color=METHODS[method], label=method)
+        values = [of(counts[b.name, method]) for b in suite.benchmarks]
+        places = np.arange(len(values)) + (number - 0.5 * (len(methods) - 1)) * width
+        axis.bar(places, values, 0.94 * width, color=METHODS[method], label=method)
     logarithmic(axis)
     axis.legend(frameon=False, fontsize=9.5, loc="upper right")
     scenes(axis, [b.name for b in suite.benchmarks])

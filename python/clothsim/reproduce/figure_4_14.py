@@ -44,7 +44,7 @@ def measure(effort: Effort) -> Measured:
     cycles = QUICK_CYCLES if effort.quick else CYCLES
     setup = Setup(rows=2)
     with effort.bar(cycles + 1, "figure 4.14", "cycle") as bar:
-        specimen = clamping.clamp("hysteresis", cycles + 1, setup, hang=False, tick=bar.update)
+        specimen = clamping.clamp("hysteresis", cycles + 1, setup, hang=False, followed=True, tick=bar.update)
     hinge = specimen.apex()
     sign = -math.copysign(1.0, specimen.clamped["rest_curvature"][-1][hinge])
     law = bending.trace(-sign * specimen.path[:, hinge], "hysteresis", **FABRIC.si())
