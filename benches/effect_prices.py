@@ -7,8 +7,9 @@ thread.
 
 An effect with a row of its own in the report is priced by that row: its milliseconds in a step and its share
 of the step's. An effect that is timed as part of another is priced by the difference of two runs, with it and
-without, taken in turns; the motion of the two differs, and with it what contact has to do. Each number is the
-least of the repeats, as whatever else the machine does can only add.
+without, taken in turns; the motion of the two differs, and with it what contact has to do. What is done once,
+before the first step, is priced by the difference of two builds. Each number is the least of the repeats, as
+whatever else the machine does can only add.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ ROOT = Path(__file__).parents[1]
 MODEL = ROOT / "crates" / "cloth-sim" / "src" / "cost_model.json"
 README = ROOT / "README.md"
 BEGIN, END = "<!-- effect prices: begin -->", "<!-- effect prices: end -->"
-COMMAND = "python benches/effect_prices.py --steps 12 --write"
+COMMAND = "python benches/effect_prices.py --write"
 WARM_UP = 5
 """Steps before the clock starts."""
 
@@ -96,6 +97,13 @@ def sewn() -> Table:
     return scene
 
 
+def blind() -> Table:
+    """The drape as it would go through the ball: no contact at all."""
+    scene = draped()
+    del scene["contact"]
+    return scene
+
+
 def law(name: str, **values: float) -> Table:
     """The contact table's entry of a friction law."""
     return {"friction": {"law": name, **values}}
@@ -112,6 +120,8 @@ class Case:
     scene: Callable[[], Table]
     where: str
     without: Callable[[], Table] | None = None
+    once: bool = False
+    """Whether it works before the first step alone."""
 
 
 AUTO = {"self_collision": "auto", "ccd": "auto"}
@@ -140,6 +150,8 @@ CASES = [
     Case("error-controlled step", lambda: hanging(time={"dt": "auto"}), "hanging", hanging),
     Case("contact", draped, "drape"),
     Case("self-contact", draped, "drape", lambda: draped({"self": False})),
+    Case("collider contact", lambda: draped({"self": False}), "drape", blind),
+    Case("friction", draped, "drape", lambda: draped({"friction": 0.0, "self_friction": 0.0})),
     Case("friction coulomb", draped, "drape", lambda: draped({"friction": 0.0, "self_friction": 0.0})),
     Case("friction coulomb-stiction", lambda: draped(law("coulomb-stiction", mu_c=0.3, mu_s=0.4)), "drape", draped),
     Case(
@@ -156,6 +168,7 @@ CASES = [
     ),
     Case("contact constraints", lambda: draped({"method": "constraints"}), "drape"),
     Case("strain limit", lambda: draped(cloth={"strain_limit": 0.1}), "drape", draped),
+    Case("untangled start", lambda: draped(start="untangle"), "drape", draped, once=True),
     Case("intersection count", lambda: draped({"allow_intersections": True}), "drape"),
     Case("flatness proofs", lambda: draped(effects={"self_collision": "auto"}), "drape", draped),
     Case("gap proofs", lambda: draped(effects={"ccd": "auto"}), "drape", draped),
@@ -178,6 +191,8 @@ class Run:
     """Processor milliseconds of a step."""
     wall: float
     """Milliseconds of a step, to which the effects' add up."""
+    build: float
+    """Processor milliseconds before the first step."""
     effects: dict[str, float | None]
     bytes: dict[str, int]
     elements: dict[str, int]
@@ -190,7 +205,8 @@ class Price:
     effect: str
     where: str
     milliseconds: float
-    share: float
+    share: float | None
+    """None where it is not in a step."""
     bytes: int
     how: str
     elements: int = field(default=0)
@@ -198,7 +214,9 @@ class Price:
 
 def run(scene: Table, steps: int) -> Run:
     """Steps after the warm-up, on one thread of the CPU."""
+    start = time.process_time()
     sim = cs.Simulation(cs.Scene(**scene), threads=1, device="cpu")
+    build = 1e3 * (time.process_time() - start)
     for _ in range(WARM_UP):
         sim.step()
 
@@ -217,6 +235,7 @@ def run(scene: Table, steps: int) -> Run:
     return Run(
         step,
         1e3 * (later - wall) / steps,
+        build,
         each,
         {e["name"]: e["bytes"] for e in rows},
         {e["name"]: e["elements"] for e in rows},
@@ -245,8 +264,11 @@ def price(case: Case, measured: dict[str, list[Run]]) -> Price:
     if case.without is None:
         own, share = min(((ms := r.effects[case.effect] or 0.0), ms / r.wall) for r in runs)
         return Price(case.effect, case.where, own, share, first.bytes[case.effect], "row", elements)
-    without = min(r.step for r in bare)
     more = sum(first.bytes.values()) - sum(bare[0].bytes.values())
+    if case.once:
+        built = min(r.build for r in runs) - min(r.build for r in bare)
+        return Price(case.effect, case.where, built, None, more, "difference, once", elements)
+    without = min(r.step for r in bare)
     return Price(case.effect, case.where, step - without, step / without - 1.0, more, "difference", elements)
 
 
@@ -254,7 +276,8 @@ def table(prices: list[Price]) -> str:
     """The prices as Markdown."""
     lines = ["| effect | scene | ms in a step | of the step | bytes | priced by |", "|---|---|---|---|---|---|"]
     lines += [
-        f"| {p.effect} | {p.where} | {p.milliseconds:.3f} | {100 * p.share:.1f} % | {p.bytes:,} | {p.how} |"
+        f"| {p.effect} | {p.where} | {p.milliseconds:.3f} | {'–' if p.share is None else f'{100 * p.share:.1f} %'} "
+        f"| {p.bytes:,} | {p.how} |"
         for p in prices
     ]
     return "\n".join(lines)
@@ -295,8 +318,9 @@ def write(prices: list[Price], steps: int, repeats: int) -> None:
     tail = rest.split(END)[1]
     intro = (
         f"61 × 61 vertices, dt 5 ms, one thread of {machine()} ({os.cpu_count()} CPUs), "
-        f"least of {repeats} runs of {steps} steps; a difference may be negative: without the effect, "
-        "contact moves otherwise."
+        f"least of {repeats} runs of {steps} steps. A difference is relative to the step without the effect, and may "
+        "be negative: without it, cloth moves otherwise. The laws of friction other than Coulomb's are priced against "
+        'his; "once": before the first step.'
     )
     README.write_text(f"{head}{BEGIN}\n{intro}\n\n{table(prices)}\n{END}{tail}")
 

@@ -42,10 +42,17 @@ class EngineLog:
             yield
         finally:
             if first is not None:
-                for step in json.loads(self._core.steps(first)):
-                    log_step(self._logger, step)
+                steps = json.loads(self._core.steps(first))
+                reasons = self._reasons() if any(step["retries"] for step in steps) else {}
+                for step in steps:
+                    log_step(self._logger, step, reasons.get(step["step"], ""))
             self._log_fallbacks()
             self._log_choices()
+
+    def _reasons(self) -> dict[int, str]:
+        """Why the first attempt of a step was refused, by step, as far as the engine has kept it."""
+        refused = json.loads(self._core.summary())["refused"]
+        return {r["step"]: r["reason"] for r in reversed(refused)}
 
     def _log_fallbacks(self) -> None:
         """Say of each GPU that is done without since when, and why."""
@@ -71,13 +78,16 @@ def step_reports(core: _core.Simulation) -> int:
     return int(json.loads(core.summary())["totals"]["steps"])
 
 
-def log_step(logger: logging.Logger, step: dict[str, Any]) -> None:
-    """Log one row of a report's ``steps``: a line at DEBUG, and one at INFO for each thing that went hard."""
+def log_step(logger: logging.Logger, step: dict[str, Any], reason: str = "") -> None:
+    """Log one row of a report's ``steps``: a line at DEBUG, and one at INFO for each thing that went hard.
+
+    ``reason`` is why its first attempt was refused, where that is known.
+    """
     where = f"step {step['step']} to {step['time']:.4f} s"
     if step["retries"]:
         logger.info(
-            "%s: refused %d times, taken in %d parts, the smallest %.3g s",
-            where, step["retries"], step["substeps"], step["smallest_dt"],
+            "%s: refused %d times, taken in %d parts, the smallest %.3g s%s",
+            where, step["retries"], step["substeps"], step["smallest_dt"], f": {reason}" if reason else "",
         )  # fmt: skip
     if not step["converged"]:
         logger.info("%s: met a cap before its tolerance, residual %.2g", where, step["residual"])

@@ -221,7 +221,7 @@ def test_everything_that_output_asks_for(tmp_path: Path, run_cli: RunCli) -> Non
     assert sorted(report["outputs"]) == names
     assert report["frame_count"] == len(report["frames"]) == 4
     assert report["frames"][-1]["energy"]["kinetic"] > 0.0
-    assert report["error"] is None
+    assert report["error"] is None and report["refused"] == [] and report["untangled"] is None
     assert report["totals"]["steps"] == sum(f["steps"] for f in report["frames"]) == 21
     assert {e["name"] for e in report["effects"]} == {e["name"] for e in report["plan"]["effects"] if e["on"]}
     recording = cs.Recording.load(out / "frames.npz")

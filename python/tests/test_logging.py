@@ -13,6 +13,7 @@ from conftest import ROOT, RunCli
 
 import clothsim as cs
 from clothsim._logs import log_step
+from clothsim.stability.catalogue import find
 
 STEP = {
     "step": 3, "time": 0.03, "retries": 0, "substeps": 1, "smallest_dt": 0.01, "converged": True, "residual": 1e-7,
@@ -62,6 +63,20 @@ def test_what_went_hard_is_worth_a_line(
     with caplog.at_level(logging.INFO, "clothsim"):
         log_step(logging.getLogger("clothsim.simulation"), {**STEP, **change})
     assert [r.getMessage() for r in caplog.records] == ([] if line is None else [f"step 3 to 0.0300 s: {line}"])
+
+
+def test_a_refused_step_says_why(caplog: pytest.LogCaptureFixture) -> None:
+    """A ball pushes a held sheet in: steps are made again smaller, and each line has the reason that the report has."""
+    scene = find("fast-sphere").build(5e-3, 30.0).scene
+    sim = cs.Simulation(scene)
+    with caplog.at_level(logging.INFO, "clothsim"):
+        sim.advance(scene.duration)
+    refused = sim.report["refused"]
+    told = [r.getMessage() for r in caplog.records if "refused" in r.getMessage()]
+    first = {r["step"]: r["reason"] for r in reversed(refused)}
+    assert told and len(told) == len(first)
+    for line, (step, reason) in zip(told, sorted(first.items()), strict=True):
+        assert line.startswith(f"step {step} to ") and line.endswith(f": {reason}") and reason
 
 
 def test_the_library_is_silent_without_a_configuration() -> None:

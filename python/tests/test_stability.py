@@ -226,6 +226,17 @@ def test_labels_of_side_change_with_a_passage_and_not_without() -> None:
     assert order(stack, plate).tolist() == [1, 1, 1] and order(swapped, plate).tolist() == [1, -1, 1]
 
 
+def test_steps_chosen_by_their_error_are_in_the_atlas() -> None:
+    """Every scene of that case has them, and a tolerance that is kept takes more of them than one that is not."""
+    case = find("auto-step")
+    for name in case.y.values:
+        time = case.build(1e-2, name).scene.to_dict()["time"]
+        assert (time["dt"], time["dt_tolerance"]) == ("auto", 1e-2), name
+    loose, tight = (observe(case.build(tolerance, "stiff springs")) for tolerance in (1e-2, 1e-4))
+    assert loose["dt"] == "auto" and judge(loose).verdict is judge(tight).verdict is Verdict.STABLE
+    assert tight["steps"] > 3 * loose["steps"]
+
+
 def test_a_cell_takes_keys_for_its_scene() -> None:
     job = {"case": "stretch", "x": 5e-3, "y": 1e4, "fixed": {}}
     assert judge(run_cell(job)[0]).verdict is Verdict.STABLE

@@ -63,12 +63,14 @@ def test_bad_requests_name_what_is_wrong(tmp_path: Path) -> None:
         ({"time.dtt": [1, 2]}, {}, 'did you mean "dt"?'),
         ({"dt": [0.01, -1.0]}, {}, "axis dt = -1"),
         ({"dt": [0.01, 0.005], "time.dt": [0.02, 0.01]}, {}, "each axis once"),
-        ({"friction": [0.1, 0.2], "cloth[3].warp": [1, 2]}, {}, "no such place"),
+        ({"dt": [0.01, 0.005], "cloth[3].warp": [1, 2]}, {}, "no such place"),
         ({"dt": [0.01, 0.005]}, {"metric": "rsm"}, 'did you mean "rms"?'),
         ({"dt": [0.01, 0.005]}, {"cost": "money"}, "cost: expected one of seconds"),
         ({"dt": [0.01, 0.005]}, {"seeds": 3, "metric": "rms"}, "every seed ends elsewhere"),
         ({"dt": [0.01, 0.005]}, {"reference": "best"}, "reference: expected one of auto"),
         ({"resolution": ["big", 5]}, {}, "axis resolution = big"),
+        ({"friction": [0.1, 0.3]}, {}, "axis friction: expected a scene with [contact]"),
+        ({"dt": [0.01, 0.005]}, {"fixed": {"detector": "bvh"}}, "axis detector: expected a scene with [contact]"),
     ]
     for vary, options, message in cases:
         with pytest.raises(cs.InvalidInput) as caught:

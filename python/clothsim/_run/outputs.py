@@ -134,6 +134,8 @@ class Outputs:
             "detection": summary["detection"],
             "fallbacks": summary["fallbacks"],
             "choices": summary["choices"],
+            "refused": summary["refused"],
+            "untangled": summary["untangled"],
             "scene_digest": self._scene_digest,
             "error": None if self._error is None else f"{type(self._error).__name__}: {self._error}",
             "simulated_seconds": self._simulation.time,

@@ -6,11 +6,22 @@ import difflib
 
 from clothsim.errors import InvalidInput
 from clothsim.stability.case import Case
-from clothsim.stability.cases import extremes, impacts, masses, meshes, piles, squeezed, starts, stiffness, tangles
+from clothsim.stability.cases import (
+    auto_steps,
+    extremes,
+    impacts,
+    masses,
+    meshes,
+    piles,
+    squeezed,
+    starts,
+    stiffness,
+    tangles,
+)
 
 __all__ = ["CATALOGUE", "find"]
 
-_GROUPS = (stiffness, masses, meshes, impacts, squeezed, tangles, piles, starts, extremes)
+_GROUPS = (stiffness, masses, meshes, impacts, squeezed, tangles, piles, starts, extremes, auto_steps)
 
 CATALOGUE: tuple[Case, ...] = tuple(case for group in _GROUPS for case in group.CASES)
 

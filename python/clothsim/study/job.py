@@ -22,7 +22,7 @@ from clothsim.study.axes import RUN_AXES, Axis, apply, axis, value_text
 from clothsim.study.closed_forms import ClosedForm, find
 from clothsim.study.folder import StudyFolder, fingerprint
 from clothsim.study.metrics import Metric, metrics
-from clothsim.study.points import Settings, check_each, check_values, product
+from clothsim.study.points import Settings, check_contact, check_each, check_values, product
 from clothsim.study.reference import Reference, by_refinement, exact, failed
 from clothsim.study.resolution import counted
 from clothsim.study.result import COSTS, Study
@@ -77,6 +77,7 @@ class Request:
         self.axes = [
             axis(a.name, [counted(self.base, v) for v in a.values]) if a.key == "resolution" else a for a in axes
         ]
+        check_contact(self.base, self.axes)
         check_each(self.base, self.axes)
         self.points = product(self.axes, sample, seed)
         names = [metric] if isinstance(metric, str) else list(metric or (["drape"] if seeds > 1 else ["rms"]))
@@ -114,8 +115,9 @@ class Request:
 def based(scene: Scene, fixed: Mapping[str, Any]) -> dict[str, Any]:
     """Tables of the scene with what is set for all runs, checked."""
     data = copy.deepcopy(scene.to_dict())
-    for name, value in fixed.items():
-        only = axis(name, [value])
+    axes = [axis(name, [value]) for name, value in fixed.items()]
+    check_contact(data, axes)
+    for only, (name, value) in zip(axes, fixed.items(), strict=True):
         if only.key in RUN_AXES:
             raise InvalidInput(f"set: {name} is no part of a scene; vary it", name=name)
         apply(data, only.key, value)

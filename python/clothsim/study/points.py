@@ -17,7 +17,7 @@ from clothsim._nearest import one_of
 from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.study.axes import Axis, apply, value_text
 
-__all__ = ["Built", "Settings", "build", "check_each", "check_values", "label", "product"]
+__all__ = ["Built", "Settings", "build", "check_contact", "check_each", "check_values", "label", "product"]
 
 # Name of an axis and its value, for every axis.
 Settings = dict[str, Any]
@@ -118,6 +118,20 @@ def build(base: Mapping[str, Any], axes: Sequence[Axis], settings: Settings) -> 
     if detector in GPU_METHODS and all(axis.key != "device" for axis in axes):
         run = replace(run, device="gpu")
     return replace(run, data=checked)
+
+
+def check_contact(base: Mapping[str, Any], axes: Sequence[Axis]) -> None:
+    """Refuse to vary how contact is made in a scene that has none: it would get one of a thickness nobody asked for.
+
+    Raises
+    ------
+    InvalidInput
+        An axis is a key of ``[contact]``, the scene has no such table, and neither has an axis its ``thickness``.
+    """
+    inner = [axis for axis in axes if axis.key.startswith("contact.")]
+    if base.get("contact") is None and inner and all(axis.key != "contact.thickness" for axis in inner):
+        expected = "a scene with [contact]; a thickness adds it, such as --set thickness=0.004"
+        raise InvalidInput(f"axis {inner[0].name}: expected {expected}; this one has none", name=inner[0].name)
 
 
 def check_each(base: Mapping[str, Any], axes: Sequence[Axis]) -> None:
