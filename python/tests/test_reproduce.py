@@ -19,7 +19,7 @@ from conftest import cli_command, without_gpu
 from clothsim import bending
 from clothsim._cli import main
 from clothsim.errors import GpuUnavailable, InvalidInput
-from clothsim.reproduce import CATALOGUE, Check, Effort, Table, clamping, find, reproduce, whole_steps
+from clothsim.reproduce import CATALOGUE, Check, Effort, Table, clamping, find, pictures, reproduce, whole_steps
 from clothsim.reproduce.contract import Reproduction
 
 # Figures and tables per chapter, from the lists at the start of the thesis.
@@ -144,7 +144,9 @@ def test_quick_variants_agree_with_the_paper(quick: Any, name: str) -> None:
     assert head.startswith(f"# figure: {entry.paper}, ")
     assert f"# made by: clothsim {facts['parameters']['made by'].split()[1]}" in head
     assert "--quick" in facts["parameters"]["made by"]
-    assert rows(out / f"{entry.stem}.csv")
+    table = rows(out / f"{entry.stem}.csv")
+    assert table
+    assert all(None not in row and None not in row.values() for row in table), "as many cells as columns"
     assert not (out / ".clothsim").exists()
 
 
@@ -285,9 +287,18 @@ def test_checks_can_fail() -> None:
     assert not Check.true("x", found=False, reason="").passed
 
 
+@pytest.mark.parametrize("width", [6.0, 17.0])
+def test_notes_stay_inside_the_picture(width: float) -> None:
+    made = pictures.figure("title", (width, 4.0), "Continuous detection with mmm and www, means over all steps. " * 9)
+    made.canvas.draw()
+    assert made._supxlabel.get_window_extent().x1 <= made.bbox.x1
+
+
 def test_tables_carry_their_parameters() -> None:
     text = Table(("a [m]", "b"), [(0.1, "x"), (2, "y")]).text({"c1 [N m2]": -0.5, "chosen": "c1"})
     assert text == "# c1 [N m2]: -0.5\n# chosen: c1\na [m],b\n0.1,x\n2,y\n"
+    text = Table(("thesis, 5 s [s]", "b"), [(0.1, 'one, "two"')]).text({})
+    assert list(csv.DictReader(text.splitlines())) == [{"thesis, 5 s [s]": "0.1", "b": 'one, "two"'}]
 
 
 def test_where_one_simulation_fails_the_others_end() -> None:

@@ -16,7 +16,7 @@ import pytest
 from conftest import ROOT, load_module
 
 import clothsim as cs
-from clothsim.reproduce import find
+from clothsim.reproduce import CATALOGUE, find
 
 pytest.importorskip("mkdocs", reason="the extra 'docs' is not installed")
 pytest.importorskip("material", reason="the extra 'docs' is not installed")
@@ -165,6 +165,38 @@ def test_the_comparison_is_with_what_the_papers_say() -> None:
         assert result["commit"]
     filled = papers.fill(r"<!-- comparison: 4\.7 -->")
     assert results["4.7"]["here"].split(" (")[0] in filled
+
+
+def test_every_table_of_the_papers_stands_beside_ours() -> None:
+    papers = tool("papers")
+    page = (ROOT / "docs" / "reproduction.md").read_text(encoding="utf-8")
+    measured = {entry.name for entry in CATALOGUE if entry.kind == "table" and entry.state == "reproduced"}
+    assert set(papers.TABLES) == measured == set(re.findall(r"<!-- table: (.*?) -->", page))
+    for name in measured:
+        columns, *rows = papers.load()["results"][name]["table"]
+        assert columns == list(papers.TABLES[name])
+        theirs = [k for k, column in enumerate(columns) if "thesis" in column or "paper" in column]
+        assert theirs, name
+        assert any(row[k] not in ("0", "–") for row in rows for k in theirs), name
+        assert all(len(row) == len(columns) for row in rows), name
+        assert " | ".join(rows[0][2:4]) in papers.fill(f"<!-- table: {name} -->").replace("\\", ""), name
+    with pytest.raises(ValueError, match=r"no such table in the store: '4\.7'"):
+        papers.fill("<!-- table: 4.7 -->")
+
+
+def test_a_table_is_read_from_what_a_command_wrote(tmp_path: Path) -> None:
+    papers = tool("papers")
+    (tmp_path / "table-6.1.csv").write_text(
+        "# made by: x, y\nbenchmark,level,active in steps [%],registrations [%],thesis: active in steps [%],"
+        "thesis: registrations [%],more\nFunnel,0,0,0,0,0,1\nFunnel,6,100,70.7531,100,70.8,1\n"
+        "Bowline,7,50,12345.6,nan,nan,1\n"
+    )
+    assert papers._read("table-6.1", tmp_path / "table-6.1.csv")[1:] == [
+        ["Funnel", "6", "100", "100", "70.75", "70.8"], ["Bowline", "7", "50", "–", "12,346", "–"]
+    ]  # fmt: skip
+    (tmp_path / "table-6.1.csv").write_text("benchmark,level\nFunnel,6\n")
+    with pytest.raises(KeyError, match="active in steps"):
+        papers._read("table-6.1", tmp_path / "table-6.1.csv")
 
 
 def test_an_equation_that_cannot_be_read_is_named() -> None:

@@ -15,7 +15,7 @@ from study_scenes import FALLING, HANGING, RESTING, error, load, study
 
 import clothsim as cs
 from clothsim.errors import InvalidInput
-from clothsim.study import evaluate, pareto, quantities
+from clothsim.study import evaluate, pareto, plots, quantities
 from clothsim.study.axes import axis, parse
 from clothsim.study.elastica import cantilever
 from clothsim.study.job import Request
@@ -120,6 +120,18 @@ def test_orders_leave_out_what_the_reference_cannot_tell() -> None:
     assert pareto.order(rough, 0.0) == pytest.approx(2.0), "one plateau does not decide"
 
 
+def test_labels_of_a_plot_leave_out_what_all_tables_share(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    laws = [{"model": "hinge", "rigidity": 1e-5}, {"model": "hinge", "rigidity": 1e-5, "damping": 0.1}]
+    others = [{"model": "nonlinear", "rigidity": 1e-5, "coercive_couple": 1e-4}]
+    request = Request(load(tmp_path, HANGING), {"bending": [*laws, *others], "dt": [0.01, 0.005]})
+    rows = [Row(p, "not run", {}) for p in request.points]
+    made = evaluate.study(request, rows, [({}, Reference("none", "none"))], {"load_before": 0.0}, 1)
+    brief = [plots._brief(made, row.label) for row in rows[::2]]
+    assert brief == ["bending hinge, dt 0.01", "bending hinge (damping 0.1), dt 0.01", "bending nonlinear, dt 0.01"]
+    assert sum(plots._named(k, 40, 9) for k in range(40)) == 9 and all(plots._named(k, 5, 9) for k in range(5))
+
+
 def test_numbers_with_units() -> None:
     assert quantities.parse("1mm", "m", "--error") == pytest.approx(1e-3)
     assert quantities.parse("20 ms", "s", "--budget") == pytest.approx(0.02)
@@ -186,6 +198,19 @@ def test_measured_orders_are_those_of_the_methods(tmp_path: Path) -> None:
         assert row.seconds and row.cpu_seconds and row.peak_bytes and row.state_bytes and row.totals["steps"]
     best = found.best()
     assert [error(r, "rms") for r in best] == sorted((error(r, "rms") for r in best), reverse=True)
+
+
+def test_memory_is_that_of_the_effects_and_more(tmp_path: Path) -> None:
+    scene = load(tmp_path, HANGING)
+    found = study(scene, {"resolution": [5, 81]}, "energy_drift", fixed={"duration": 5e-3})
+    small, large = found.rows
+    direct = cs.Simulation(cs.Scene(**{**scene.to_dict(), "duration": 5e-3}), threads=1)
+    direct.advance(5e-3)
+    assert small.state_bytes == sum(e["bytes"] for e in direct.report["effects"])
+    # 6561 vertices instead of 25 and 12800 triangles instead of 32; edges and hinges lie between.
+    assert small.state_bytes and large.state_bytes and large.peak_bytes
+    assert 6561 / 25 < large.state_bytes / small.state_bytes < 12800 / 32
+    assert large.peak_bytes > large.state_bytes
 
 
 def test_resolution_converges_and_its_reference_is_finer(tmp_path: Path) -> None:

@@ -95,6 +95,15 @@ def test_drifts() -> None:
     assert METRICS["spin_drift"].measure(sheet(5, pinned=np.arange(25) == 0)) is None
 
 
+def test_quantities_at_the_end() -> None:
+    """Energies of the last moment, of deformation without motion and height; the height goes along the scene's up."""
+    x = sheet(5).x_start
+    ended = sheet(5, x_end=x - [0.0, 0.3, 0.7])
+    assert METRICS["strain_energy"].measure(ended) == 1.0 and METRICS["kinetic_energy"].measure(ended) == 2.0
+    assert METRICS["lowest"].measure(ended) == pytest.approx(-0.3)
+    assert METRICS["lowest"].measure(sheet(5, x_end=ended.x_end, data={"up": "z"})) == pytest.approx(-0.5 - 0.7)
+
+
 def test_contact_stick_and_drape_metrics() -> None:
     data = {"up": "y", "cloth": [{}], "contact": {"thickness": 0.01}}
     table = {

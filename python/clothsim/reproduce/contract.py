@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 import os
 import threading
@@ -65,11 +67,13 @@ class Table:
     rows: Iterable[Sequence[Any]]
 
     def text(self, parameters: Mapping[str, Any]) -> str:
-        """CSV whose first lines, each with a ``#``, are the parameters."""
-        lines = [f"# {name}: {_cell(value)}" for name, value in parameters.items()]
-        lines.append(",".join(self.columns))
-        lines += [",".join(_cell(value) for value in row) for row in self.rows]
-        return "\n".join(lines) + "\n"
+        """CSV whose first lines, each with a ``#``, are the parameters; a name or text with a comma is quoted."""
+        written = io.StringIO()
+        written.writelines(f"# {name}: {_cell(value)}\n" for name, value in parameters.items())
+        rows = csv.writer(written, lineterminator="\n")
+        rows.writerow(self.columns)
+        rows.writerows([_cell(value) for value in row] for row in self.rows)
+        return written.getvalue()
 
 
 def _cell(value: Any) -> str:

@@ -247,6 +247,8 @@ def scenes(axis: Any, names: Sequence[str]) -> None:
     """Write the benchmarks' names below bars."""
     size = 9.5 if len(names) < 6 else 8.5
     axis.set_xticks(range(len(names)), [name.replace(" (", "\n(") for name in names], fontsize=size)
+    room = max(0.0, 0.5 * (3 - len(names)))  # one or two bars are no wider than those of three
+    axis.set_xlim(-0.5 - room, len(names) - 0.5 + room)
     axis.tick_params(axis="x", length=0)
     axis.grid(axis="x", visible=False)
     axis.spines["bottom"].set_color(pictures.GRID)

@@ -139,6 +139,7 @@ def draw(measured: Measured) -> bytes:
             n = [s.cycles for s in measured.specimens[law]]
             axis.plot(n, np.degrees(values(law)), "o-", color=pictures.LAWS[law], label=law, linewidth=1.8)
         axis.set_ylim(bottom=0.0)
+        axis.set_xticks(n)
         axis.legend(frameon=False, fontsize=9.5)
     return pictures.png(figure)
 

@@ -361,7 +361,7 @@ def draw(measured: Measured) -> bytes:
     velocity.plot(other.times, 100.0 * other.velocity, **style)
     edge = np.maximum(0.0, measured.runs["C"].times - s.start) * s.speed
     way.plot(measured.runs["C"].times, 100.0 * edge, color=pictures.FAINT, linewidth=1.0, label="held edge")
-    for value, name in ((COEFFICIENTS.mu_s, "μ_s"), (COEFFICIENTS.mu_c, "μ_c")):
+    for value, name in ((COEFFICIENTS.mu_s, "$μ_s$"), (COEFFICIENTS.mu_c, "$μ_c$")):
         pull.axhline(value, color=pictures.FAINT, linewidth=1.0, linestyle=(0, (4, 3)))
         pull.annotate(name, (0.0, value), xytext=(2, 3), textcoords="offset points", fontsize=9, color=pictures.FAINT)
     pull.set_ylim(0.0, 1.25 * COEFFICIENTS.mu_s)

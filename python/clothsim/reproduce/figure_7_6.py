@@ -124,7 +124,7 @@ def draw(measured: Measured) -> bytes:
     for axis, image, moment in zip(upper.subplots(1, len(MOMENTS)), images, MOMENTS, strict=True):
         pictures.show(axis, image, f"{moment:g} s")
     axis = lower.subplots()
-    pictures.tidy(axis, "displacement after 1 s, by μ_c (μ_s = 2 μ_c); a ring: does not slide", "μ_c")
+    pictures.tidy(axis, "displacement after 1 s, by $μ_c$ ($μ_s = 2 μ_c$); a ring: does not slide", "$μ_c$")
     for row, law in enumerate(LAWS):
         for column, mu_c in enumerate(MU_C):
             slides = measured.slides(law, mu_c)

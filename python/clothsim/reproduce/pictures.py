@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,18 +15,21 @@ from clothsim.recording import Body, Recording
 __all__ = ["FAINT", "GRID", "INK", "LAWS", "caption", "figure", "png", "show", "tidy", "tiles"]
 
 INK, FAINT, GRID = "#343230", "#8c8882", "#e4e1db"
+_LETTERS = 13.0  # of a note, per inch: the mean of its font, and some room
 _MARGIN = 1.12  # of a tile's frame over what is seen in it
 # One colour per bending law.
 LAWS = {"linear": "#2f5d8c", "nonlinear": "#3f7a57", "plastic": "#c08a2e", "hysteresis": "#9c2f35"}
 
 
 def figure(title: str, size: tuple[float, float], note: str = "") -> Any:
-    """Make a figure of ``size`` [inch] with its title above and a note below."""
+    """Make a figure of ``size`` [inch] with its title above and a note below, its lines broken at the width."""
     figures = optional("matplotlib.figure", extra="plot", purpose="drawing plots")
     optional("matplotlib.backends.backend_agg", extra="plot", purpose="drawing plots")
     made = figures.Figure(figsize=size, dpi=150, layout="constrained")
     made.suptitle(title, fontsize=15, color=INK, x=0.01, ha="left")
     if note:
+        wide = int(_LETTERS * size[0])
+        note = "\n".join(textwrap.fill(line, wide) for line in note.splitlines())
         made.supxlabel(note, fontsize=9.5, color=FAINT, x=0.01, ha="left")
     return made
 

@@ -173,8 +173,8 @@ def draw(measured: Measured) -> bytes:
     )
     figure = pictures.figure("Table 4.1: running time of the bending component", (11.5, 5.2), note)
     left, right = figure.subplots(1, 2)
-    pictures.tidy(left, "time per step [ms]", "α = h_i/h_e")
-    pictures.tidy(right, "share of the step [%]", "α = h_i/h_e")
+    pictures.tidy(left, "time per step [ms]", "$α = h_i/h_e$")
+    pictures.tidy(right, "share of the step [%]", "$α = h_i/h_e$")
     for number, law in enumerate(LAWS):
         at = np.array(ALPHAS) + (number - 0.5) * 0.34
         median = np.array([measured.median(law, a) for a in ALPHAS])

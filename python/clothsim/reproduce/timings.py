@@ -230,9 +230,11 @@ def draw_parts(measured: Parts, printed: Mapping[str, float], title: str) -> byt
     pictures.tidy(right, "stages here [ms]")
     found = measured.shares
     colours = dict(zip(found, ("#c9c5be", "#3f7a57", "#c08a2e", "#9c2f35", "#2f5d8c", "#7a4f86"), strict=False))
+    reach = 0.1 * max(found.values())  # of a number beside its bar
     for k, (group, share) in enumerate(found.items()):
         left.barh(k, share, 0.62, color=colours[group])
-        left.text(share, k, f" {share:.1f}", va="center", fontsize=9.5)
+        theirs = printed.get(group, 0.0)
+        left.text(theirs if share < theirs < share + reach else share, k, f" {share:.1f}", va="center", fontsize=9.5)
         if group in printed:
             left.vlines(
                 printed[group], k - 0.31, k + 0.31, colors=pictures.INK, linestyles=(0, (3, 1.2)), linewidth=1.8

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from clothsim._arrays import optional
@@ -19,6 +19,8 @@ __all__ = ["draw"]
 _COLOURS = ("#2f5d8c", "#9c2f35", "#c08a2e", "#3f7a57", "#7a5195", "#5aa0a8", "#c46f9b", "#8d8a84", "#a8a03c")
 _MARKS = "os^Dv<>Ph*"
 _MOST_NAMED = 12
+# Lines of text beside the plots, and what an entry of the legend takes of them.
+_LINES, _ENTRY = 27.5, 1.05
 # Where numbers stand beside their points, in turn where points are close [pt].
 _BESIDE = ((8, 7), (-16, -17), (-16, 8), (9, -17))
 
@@ -111,6 +113,7 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
             if (e := _error(study, r)) is not None and (own := r.values[study.metric.name].uncertain):
                 axis.plot([getattr(r, study.cost)] * 2, [max(e - own, 0.01 * e), e + own], color=colour, lw=1.2)
     best = [(float(getattr(r, study.cost)), e) for r in study.best() if (e := _error(study, r)) is not None]
+    most = _most_named(study, along)
     if best:
         axis.plot(*zip(*best, strict=True), "-", color=INK, lw=4.5, alpha=0.13, zorder=1, solid_capstyle="round")
         axis.plot(*zip(*best, strict=True), "o", mfc="none", mec=INK, ms=12, mew=1.4, zorder=4, label="front")
@@ -118,7 +121,7 @@ def _work(axis: Any, study: Study, along: Axis | None) -> None:
         for n, (c, e) in enumerate(best, start=1):
             near = n > 1 and c < 1.25 * best[n - 2][0] and e > 0.4 * best[n - 2][1]
             turn = (turn + 1) % len(_BESIDE) if near else 0
-            if _named(n - 1, len(best)):
+            if _named(n - 1, len(best), most):
                 axis.annotate(
                     str(n), (c, e), xytext=_BESIDE[turn], textcoords="offset points", fontsize=9.5, color=INK,
                     weight="bold",
@@ -140,11 +143,29 @@ def _hollow(axis: Any, study: Study, rows: list[Row], colour: str, mark: str, at
             axis.plot([at(r)], [e], mark, mfc="white", mec=colour, ms=5.5, zorder=3)
 
 
-def _named(k: int, count: int) -> bool:
-    """Whether the k-th of the front is named: all, or evenly spread."""
-    if count <= _MOST_NAMED:
-        return True
-    return k in {round(j * (count - 1) / (_MOST_NAMED - 1)) for j in range(_MOST_NAMED)}
+def _most_named(study: Study, along: Axis | None) -> int:
+    """How many of the front are named in two lines each, above the legend."""
+    return max(2, min(_MOST_NAMED, int((_LINES - _ENTRY * (1 + len(_series(study, along)))) // 2)))
+
+
+def _named(k: int, count: int, most: int) -> bool:
+    """Whether the k-th of the front is named: all, or ``most`` of them, evenly spread."""
+    return count <= most or k in {round(j * (count - 1) / (most - 1)) for j in range(most)}
+
+
+def _brief(study: Study, text: str) -> str:
+    """A label without what the tables of an axis share: ``hinge (rigidity 1, damping 2)`` as ``hinge (damping 2)``."""
+    pairs = []
+    for axis in study.axes:
+        tables = [v for v in axis.values if isinstance(v, Mapping)]
+        for table in tables:
+            head = value_text(table).split(" (")[0]
+            alike = [t for t in tables if value_text(t).split(" (")[0] == head]
+            own = {k: v for k, v in table.items() if str(v) == head or any(t.get(k) != v for t in alike)}
+            pairs.append((value_text(table), value_text(own)))
+    for long, short in sorted(pairs, key=lambda p: -len(p[0])):
+        text = text.replace(long, short)
+    return text
 
 
 def _scales(axis: Any, study: Study) -> None:
@@ -231,10 +252,13 @@ def _names(axis: Any, study: Study, along: Axis | None) -> None:
     unit, _ = COSTS[study.cost]
     lines = []
     best = study.best()
+    most = _most_named(study, along)
     for k, row in enumerate(best):
-        if _named(k, len(best)):
+        if _named(k, len(best), most):
             error = amount(row.values[study.metric.name].error, study.metric.unit)
-            lines.append(f"{k + 1}  {row.label}\n     {error} for {amount(getattr(row, study.cost), unit)}")
+            lines.append(
+                f"{k + 1}  {_brief(study, row.label)}\n     {error} for {amount(getattr(row, study.cost), unit)}"
+            )
     if lines:
         axis.text(
             0.0, 1.0, "The front\n" + "\n".join(lines), transform=axis.transAxes, va="top", fontsize=9, color=INK,
@@ -242,6 +266,6 @@ def _names(axis: Any, study: Study, along: Axis | None) -> None:
         )  # fmt: skip
     handles, names = axis.figure.axes[0].get_legend_handles_labels()
     orders = {label(o.settings): o.order for o in study.orders if along and o.axis == along.name}
-    names = [name + (f": order {orders[name]:.1f}" if name in orders else "") for name in names]
+    names = [_brief(study, name) + (f": order {orders[name]:.1f}" if name in orders else "") for name in names]
     if len(names) > (1 if along else 2):  # the front is one, which tells nothing beside nameless points
         axis.legend(handles, names, frameon=False, fontsize=9, loc="lower left", bbox_to_anchor=(-0.02, -0.06))
