@@ -16,8 +16,9 @@ from conftest import RunCli, cli_command
 
 import clothsim as cs
 from clothsim._cli import main
-from clothsim.sweep import cluster, task
+from clothsim.sweep import cluster, farm, task
 from clothsim.sweep.draws import draw
+from clothsim.sweep.file import read as read_sweep
 
 pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
 pq = pytest.importorskip("pyarrow.parquet", reason="the extra 'sweep' is not installed")
@@ -253,6 +254,53 @@ def test_a_scheduler_that_goes_in_mid_run(tmp_path: Path, scheduler: str, monkey
     there = cs.sweep.run_file(path, scheduler=scheduler, out=tmp_path / "out", resume=True, progress=False)
     assert there.runs.equals(here.runs)
     assert there.frames.equals(here.frames)
+
+
+@pytest.mark.parametrize("status", ["lost", "pending", "finished"])
+def test_a_result_that_is_lost_with_its_worker_is_waited_for(tmp_path: Path, status: str) -> None:
+    """A worker that ends just after a run: the run is neither failed nor done until there is a result."""
+
+    class Future:
+        key, released = "", False
+
+        def exception(self) -> None:
+            return None
+
+        def result(self, timeout: float) -> None:
+            raise TimeoutError
+
+        def add_done_callback(self, told: Any) -> None:
+            self.told = told
+
+        def release(self) -> None:
+            self.released = True
+
+    class Client:
+        def submit(self, _: Any, *__: Any, key: str, **___: Any) -> Any:
+            future.key = key
+            return future
+
+    class Workers:
+        client, slots = Client(), 1
+
+        def look_after(self) -> None:
+            """Nobody is missing."""
+
+    future: Any = Future()
+    request = read_sweep(write(tmp_path, "[vary]\nfabric = ['cotton']\n" + SMALL)).request
+    work, found = task.Work(str(tmp_path), "token"), []
+    one = farm._Farm(Workers(), request, work, 1, lambda *told: found.append(told), print)  # type: ignore[arg-type]
+    one._submit(request.runs[0])
+    future.status = status
+    one._take(future)
+    assert (found, future.released) == ([], False)
+    assert list(one._open) == [future.key]
+    result = work.result(request.runs[0].name)
+    result.parent.mkdir()
+    result.write_text('{"seconds": 1.0}')
+    one._take(future)
+    assert [facts["seconds"] for _, facts in found] == [1.0]
+    assert future.released
 
 
 @pytest.mark.parametrize(

@@ -128,7 +128,12 @@ class _Farm:
         run, _ = self._open.pop(future.key, (None, None))
         if run is None:
             return
-        if future.status in ("finished", "pending"):
+        status = future.status
+        if status == "cancelled":
+            gone = self._cluster.client.status != "running"
+            raise ClusterError(_GONE if gone else f"the scheduler has let go of its runs; {_GO_ON}")
+        error = future.exception() if status == "error" else None
+        if error is None:  # finished; or "lost" or "pending" since: its worker ended with the result
             facts = self._facts(run, future)
             if facts is None:
                 return
@@ -137,10 +142,6 @@ class _Farm:
             self._done(run, facts)
             future.release()
             return
-        if future.status == "cancelled":
-            gone = self._cluster.client.status != "running"
-            raise ClusterError(_GONE if gone else f"the scheduler has let go of its runs; {_GO_ON}")
-        error = future.exception()
         if isinstance(error, KilledWorker):
             self._start_again(run)
         elif isinstance(error, (OutputError, ClusterError)):
