@@ -3,8 +3,9 @@
     python tools/kills.py --kills 100
 
 Each kill is a new run: SIGKILL at a time drawn evenly over the time that the run takes once it has its folder, then one
-``--resume`` on one or two threads. What is compared: the frames, OBJ, glTF and PC2 files byte by byte, and the report
-without its clocks. The scene has what remembers: hysteresis, stick-slip friction, self-contact, a collider that turns.
+``--resume`` on one or two threads. What is compared: the frames, states, OBJ, glTF and PC2 files byte by byte, and the
+report without its clocks. The scene has what remembers: hysteresis, stick-slip friction, self-contact, a collider that
+turns.
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ keyframes = [
 [output]
 fps = 60
 velocities = true
+states = 4
 obj = true
 gltf = true
 pc2 = true

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from clothsim import _core
@@ -87,25 +86,13 @@ class Simulation:
         *,
         allow_intersections: bool = False,
     ) -> None:
-        self._begin(scene, threads, device, allow_intersections, None)
-
-    def _begin(
-        self,
-        scene: Scene,
-        threads: int | None,
-        device: str,
-        allow_intersections: bool,
-        start: tuple[float, Floats, Floats] | None,
-    ) -> None:
-        if not isinstance(scene, Scene):
-            raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
         self._core = _core.Simulation(
-            scene.check(),
+            _checked(scene).check(),
             *scene.assets(),
             check_threads(threads),
             check_device(device),
             bool(allow_intersections),
-            start,
+            None,
         )
         self._log = EngineLog(_logger, self._core)
 
@@ -113,36 +100,44 @@ class Simulation:
     def from_frame(
         cls,
         scene: Scene,
-        recording: Recording,
-        frame: int = -1,
+        recording: Recording | str | os.PathLike[str],
+        frame: int | None = None,
         threads: int | None = None,
         device: str = "auto",
         *,
         allow_intersections: bool = False,
+        state: bool = True,
     ) -> Simulation:
-        """Begin in mid-scene, with the cloth as a frame of a recording shows it.
+        """Begin in mid-scene, at a frame of a run or as a recording shows it.
 
-        The scene may be another one than that of the recording, as long as it has cloths of the same names and meshes:
-        colliders, pins, materials and times are the scene's. A frame has no memory of what bending and contact did
-        before it, so a run that goes on from a checkpoint (`resume`) has the same bits, and one from a frame only if
-        neither matters.
+        The scene may be another one than that of the run, as long as it has cloths of the same names and meshes:
+        colliders, pins, materials and times are the scene's. From a run that has kept states (``output.states``) the
+        full state goes on, to the same bits if the scene is the same. A recording has no memory of what bending and
+        contact did before its frame: the run is then the same only if neither matters, and near it else.
 
         Parameters
         ----------
         scene : Scene
             What to simulate.
-        recording : Recording
-            Frames with the scene's cloths, by name. With velocities (``output.velocities = true``) the state is exact;
-            without, they are the differences of the frames beside it.
-        frame : int
-            Number of the frame; negative: from the end.
+        recording : Recording or path
+            Folder of a run, or frames with the scene's cloths, by name. With velocities (``output.velocities = true``)
+            they are exact; without, they are the differences of the frames beside it.
+        frame : int, optional
+            Number of the frame; negative: from the end. By default the last one; of a run with states, the last that
+            has one.
         threads, device, allow_intersections
             As for `Simulation`.
+        state : bool
+            False: positions and velocities alone, though the run has kept states.
 
         Raises
         ------
         InvalidInput
-            There is no such frame, or its cloths are not the scene's.
+            There is no such frame, it has no state while others have, or its cloths are not the scene's.
+        InvalidScene
+            A cloth has other vertices or triangles than in the state.
+        CheckpointError
+            The state cannot be read, was cut off or damaged, or is of another version.
         IntersectingStart
             Triangles pass through each other there: an edited collider may be inside the cloth.
 
@@ -157,17 +152,17 @@ class Simulation:
         """
         from clothsim._run.start import Start
 
-        start = Start.of(recording, scene, frame)
+        if isinstance(recording, str | os.PathLike):
+            start = Start.of_run(Path(recording), scene, frame, state=state)
+        else:
+            start = Start.of(recording, scene, -1 if frame is None else frame)
         return cls._from_start(scene, start, threads, device, allow_intersections=allow_intersections)
 
     @classmethod
     def _from_start(
         cls, scene: Scene, start: Start, threads: int | None, device: str, *, allow_intersections: bool
     ) -> Simulation:
-        simulation = cls.__new__(cls)
-        state = (start.time, np.ascontiguousarray(start.positions), np.ascontiguousarray(start.velocities))
-        simulation._begin(scene, threads, device, allow_intersections, state)
-        return simulation
+        return cls._over(start.begin(_checked(scene), threads, device, bool(allow_intersections)))
 
     @classmethod
     def _over(cls, core: _core.Simulation) -> Simulation:
@@ -407,27 +402,45 @@ class Simulation:
         write_whole(Path(path), self._core.checkpoint(0 if steps else step_reports(self._core)))
 
     @classmethod
-    def resume(cls, path: str | os.PathLike[str], threads: int | None = None, device: str = "auto") -> Simulation:
+    def resume(
+        cls,
+        path: str | os.PathLike[str],
+        threads: int | None = None,
+        device: str = "auto",
+        *,
+        scene: Scene | None = None,
+    ) -> Simulation:
         """Go on from a checkpoint, to the same bits as if the run had not been interrupted.
 
-        ``threads`` and ``device`` may be others than before, as for `Simulation`.
+        ``threads`` and ``device`` may be others than before, as for `Simulation`. With another ``scene``, which has the
+        same cloths, the full state goes on with that: what its edits touch begins anew, and ``report["continued"]``
+        and a warning say so.
 
         Parameters
         ----------
         path : str or path
-            What `save_checkpoint` wrote.
+            What `save_checkpoint` wrote, or with ``scene`` the state of a frame (``OUT/states/000012.state``).
         threads : int, optional
             How many threads; all by default.
         device : {"auto", "cpu", "gpu"}
             Where to detect collisions.
+        scene : Scene, optional
+            The scene to go on with; by default that in the checkpoint.
 
         Raises
         ------
         CheckpointError
             The file cannot be read, is no checkpoint, of another version, cut off or damaged.
+        InvalidScene
+            A cloth of ``scene`` has another name, or other vertices or triangles, than in the checkpoint.
         DeviceError
             As for `Simulation`.
         """
+        if scene is not None:
+            from clothsim._run.start import Start
+
+            start = Start.of_state(Path(path))
+            return cls._from_start(scene, start, threads, device, allow_intersections=False)
         try:
             content = Path(path).read_bytes()
         except OSError as error:
@@ -441,3 +454,9 @@ class Simulation:
     def __repr__(self) -> str:
         cloth = sum(b.vertex_count for b in self.bodies if b.kind == "cloth")
         return f"Simulation({cloth} cloth vertices, t = {self.time:g} s)"
+
+
+def _checked(scene: Scene) -> Scene:
+    if not isinstance(scene, Scene):
+        raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
+    return scene

@@ -14,8 +14,9 @@ import pytest
 from conftest import ROOT, SCENE
 
 import clothsim as cs
-from clothsim._run.folder import RunFolder, read_checkpoint
+from clothsim._run.folder import RunFolder
 from clothsim._run.job import Job, Stopped
+from clothsim._run.sealed import read_sealed as read_checkpoint
 
 
 @pytest.fixture(scope="module")

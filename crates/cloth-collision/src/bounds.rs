@@ -1,11 +1,13 @@
 //! Bounding boxes that move: one box per end of the step, in single precision, rounded outward.
 
 mod compare;
+mod fit;
 
 use crate::Vec3;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use compare::avx;
 pub(crate) use compare::{Bounds, Compare, Plain, lanes};
+pub(crate) use fit::fit;
 
 /// Lanes of a [`Block`].
 pub(crate) const LANES: usize = 8;
@@ -18,6 +20,7 @@ pub(crate) const ALL_LANES: u32 = (1 << LANES) - 1;
 /// linearly. Two such boxes are apart during the whole step if along one axis the same one lies above the other at
 /// all ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C)]
 pub(crate) struct MovingBox<const ENDS: usize> {
     /// `[end][axis]`
     pub(crate) lo: [[f32; 3]; ENDS],
@@ -109,7 +112,7 @@ fn round_down(value: f64, d: f64) -> f32 {
 
 /// The boxes of [`LANES`] features or subtrees, by coordinate. Unused lanes hold [`MovingBox::EMPTY`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[repr(align(32))]
+#[repr(C, align(32))]
 pub(crate) struct Block<const ENDS: usize> {
     /// `[end][axis][lane]`
     pub(crate) lo: [[[f32; LANES]; 3]; ENDS],

@@ -46,26 +46,7 @@ impl PySimulation {
         allow_intersections: bool,
         start: Option<(f64, Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<Self> {
-        let mut assets = Assets::default();
-        for (name, arrays) in meshes {
-            let (vertices, triangles, uv, groups): MeshTuple<'_> = arrays.extract()?;
-            let name: String = name.extract()?;
-            assets.meshes.insert(name.clone(), mesh_from(&vertices, &triangles, uv.as_ref())?);
-            if !groups.is_empty() {
-                assets.groups.insert(name, groups);
-            }
-        }
-        for (name, arrays) in sequences {
-            let (frames, triangles, fps): (Bound<'_, PyAny>, Bound<'_, PyAny>, Option<f64>) =
-                arrays.extract()?;
-            let frames = frames_from(&frames, "positions")?;
-            let vertex_count = frames.first().map_or(0, Vec::len);
-            let triangles = triangles_from(&triangles, "triangles", vertex_count)?;
-            assets.sequences.insert(name.extract()?, Sequence { triangles, frames, fps });
-        }
-        for (name, array) in velocities {
-            assets.velocities.insert(name.extract()?, vertices_from(&array, "velocities")?);
-        }
+        let assets = assets_from(meshes, sequences, velocities)?;
         let device = device.parse().map_err(|error| device_error(py, &error))?;
         let options =
             SimulationOptions { threads, allow_intersections, device, ..SimulationOptions::default() };
@@ -96,6 +77,31 @@ impl PySimulation {
         let options = SimulationOptions { threads, device, ..SimulationOptions::default() };
         let simulation = py
             .detach(|| Simulation::resume_on(bytes, options).map_err(Box::new))
+            .map_err(|error| sim_error(py, &error))?;
+        Ok(Self { simulation: Mutex::new(simulation) })
+    }
+
+    /// The scene from a state on that `frame_state` gave.
+    #[staticmethod]
+    #[pyo3(signature = (state, scene, meshes, sequences, velocities, threads, device, allow_intersections))]
+    fn continue_from(
+        py: Python<'_>,
+        state: &[u8],
+        scene: &Bound<'_, PyScene>,
+        meshes: &Bound<'_, PyDict>,
+        sequences: &Bound<'_, PyDict>,
+        velocities: &Bound<'_, PyDict>,
+        threads: Option<usize>,
+        device: &str,
+        allow_intersections: bool,
+    ) -> PyResult<Self> {
+        let assets = assets_from(meshes, sequences, velocities)?;
+        let device = device.parse().map_err(|error| device_error(py, &error))?;
+        let options =
+            SimulationOptions { threads, allow_intersections, device, ..SimulationOptions::default() };
+        let scene = &scene.get().scene;
+        let simulation = py
+            .detach(|| Simulation::continue_from(state, scene, assets, options).map_err(Box::new))
             .map_err(|error| sim_error(py, &error))?;
         Ok(Self { simulation: Mutex::new(simulation) })
     }
@@ -163,6 +169,12 @@ impl PySimulation {
     /// Velocities of all cloth vertices [m/s], (n, 3); a copy.
     fn velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
         let points = self.read(py, |simulation| simulation.velocities().to_vec());
+        points_to_numpy(py, &points)
+    }
+
+    /// Start positions of all cloth vertices [m] as the scene places them, before pins, (n, 3); a copy.
+    fn start_positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let points = self.read(py, Simulation::start_positions);
         points_to_numpy(py, &points)
     }
 
@@ -258,6 +270,12 @@ impl PySimulation {
         let bytes = self.read(py, |simulation| simulation.checkpoint_from(first));
         PyBytes::new(py, &bytes)
     }
+
+    /// The full state without meshes and report, as bytes.
+    fn frame_state<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        let bytes = self.read(py, Simulation::frame_state);
+        PyBytes::new(py, &bytes)
+    }
 }
 
 impl PySimulation {
@@ -298,6 +316,34 @@ impl PySimulation {
             None => Ok(advance.steps),
         }
     }
+}
+
+/// The arrays that a scene names.
+fn assets_from(
+    meshes: &Bound<'_, PyDict>,
+    sequences: &Bound<'_, PyDict>,
+    velocities: &Bound<'_, PyDict>,
+) -> PyResult<Assets> {
+    let mut assets = Assets::default();
+    for (name, arrays) in meshes {
+        let (vertices, triangles, uv, groups): MeshTuple<'_> = arrays.extract()?;
+        let name: String = name.extract()?;
+        assets.meshes.insert(name.clone(), mesh_from(&vertices, &triangles, uv.as_ref())?);
+        if !groups.is_empty() {
+            assets.groups.insert(name, groups);
+        }
+    }
+    for (name, arrays) in sequences {
+        let (frames, triangles, fps): (Bound<'_, PyAny>, Bound<'_, PyAny>, Option<f64>) = arrays.extract()?;
+        let frames = frames_from(&frames, "positions")?;
+        let vertex_count = frames.first().map_or(0, Vec::len);
+        let triangles = triangles_from(&triangles, "triangles", vertex_count)?;
+        assets.sequences.insert(name.extract()?, Sequence { triangles, frames, fps });
+    }
+    for (name, array) in velocities {
+        assets.velocities.insert(name.extract()?, vertices_from(&array, "velocities")?);
+    }
+    Ok(assets)
 }
 
 /// Runs the handlers of signals that have come; one that raises (Ctrl-C) is the error.

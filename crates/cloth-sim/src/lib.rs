@@ -46,6 +46,7 @@ mod untangle;
 
 pub use assets::{Assets, Sequence};
 pub use bodies::{BodyInfo, BodyKind};
+pub use checkpoint::Continued;
 pub use error::SimError;
 pub use pace::Advance;
 pub use plan::{Effect, Plan};

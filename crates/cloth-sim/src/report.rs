@@ -31,6 +31,9 @@ pub struct Report {
     /// What `start = "untangle"` did; none where the start state was clean.
     #[serde(default)]
     pub untangled: Option<crate::Untangled>,
+    /// From what state the simulation went on, and what was other then; none where it began at the scene's start.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub continued: Option<crate::Continued>,
 }
 
 /// Attempts that a report lists.
@@ -392,6 +395,7 @@ impl Report {
             choices: self.choices.clone(),
             refused: self.refused.clone(),
             untangled: self.untangled.clone(),
+            continued: self.continued.clone(),
         }
     }
 

@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 
 from clothsim._export.writers import FORMATS, write
-from clothsim.errors import InvalidInput
-from clothsim.recording import Recording
+from clothsim._run.start import load_run
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
 
@@ -32,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(options: argparse.Namespace) -> int:
     """Write each format, and say where."""
-    recording = read_run(options.run)
+    recording = load_run(options.run)
     folder = options.to or (options.run if options.run.is_dir() else options.run.parent)
     folder.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
@@ -45,18 +44,3 @@ def execute(options: argparse.Namespace) -> int:
     else:
         print("\n".join(str(path) for path in written))
     return 0
-
-
-def read_run(run: Path) -> Recording:
-    """Frames of a run, by its folder or by its frames.npz.
-
-    Raises
-    ------
-    InvalidInput
-        There are no frames, or they cannot be read.
-    """
-    path = run / "frames.npz" if run.is_dir() else run
-    if not path.exists():
-        reason = "the run is not finished, or output.npz = false" if run.is_dir() else "no such file"
-        raise InvalidInput(f"{path}: expected the frames of a run, got nothing ({reason})", name="OUT")
-    return Recording.load(path)

@@ -10,7 +10,6 @@ from typing import Any
 
 from clothsim._cli.arguments import add_existing, add_out, count, folder, written
 from clothsim._cli.device import add_device
-from clothsim._cli.export import read_run
 from clothsim._device import check_device, check_threads
 from clothsim._run.job import Job, Stopped
 from clothsim._run.start import Start
@@ -43,10 +42,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="run",
         metavar="RUN",
         type=folder,
-        help="go on from a frame of this finished run (or frames.npz)",
+        help="begin at a frame of this run, also with an edited scene: with its full state where the run has kept "
+        "states (output.states), and to the same bits if nothing is edited; else with positions and velocities; or at "
+        "a .state or .checkpoint, or a frame of a frames.npz",
     )
     parser.add_argument(
-        "--frame", metavar="N", type=int, help="number of that frame (default: the last; -2: the one before)"
+        "--frame", metavar="N", type=int, help="number of that frame (default: the last one; -2: the one before)"
+    )
+    parser.add_argument(
+        "--no-state", action="store_true", help="positions and velocities alone, though the run has kept states"
     )
     add_existing(parser, "run")
 
@@ -57,9 +61,10 @@ def execute(options: argparse.Namespace) -> int:
     scene = Scene.load(options.scene)
     start = None
     if options.run is not None:
-        start = Start.of(read_run(options.run), scene, -1 if options.frame is None else options.frame)
-    elif options.frame is not None:
-        raise InvalidInput("--frame: expected --from RUN with it, got --frame alone", name="--frame")
+        start = Start.of_run(options.run, scene, options.frame, state=not options.no_state)
+    for name, given in (("--frame", options.frame is not None), ("--no-state", options.no_state)):
+        if given and options.run is None:
+            raise InvalidInput(f"{name}: expected --from RUN with it, got {name} alone", name=name)
     job = Job(
         scene,
         options.out,
@@ -78,6 +83,7 @@ def execute(options: argparse.Namespace) -> int:
         device = "" if options.device == "auto" else f" --device {options.device}"
         begin = "" if options.run is None else f" --from {options.run}"
         begin += "" if options.frame is None else f" --frame {options.frame}"
+        begin += " --no-state" if options.no_state else ""
         again = f"clothsim run {options.scene} -o {options.out}{begin}{device} --resume"
         if options.json:
             print(json.dumps({"stopped": str(stop), "frames": stop.frames, "of": stop.total, "resume": again}))

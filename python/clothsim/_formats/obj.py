@@ -34,7 +34,7 @@ def parse(content: bytes, name: str) -> RawMesh:
     current: dict[str, list[str]] = {"g": [], "o": [], "usemtl": []}
     members: dict[str, list[int]] = {}
     room = _MOST_MEMBERS
-    text = content.decode("utf-8", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
+    text = content.decode("utf-8-sig", errors="replace").replace("\\\n", " ").replace("\\\r\n", " ")
     for number, line in enumerate(text.splitlines(), start=1):
         words = line.split()
         if not words:

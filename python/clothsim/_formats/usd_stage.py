@@ -115,7 +115,7 @@ def _codes(stage: Any, request: Request, path: Path, meshes: list[Any]) -> tuple
     rate = float(stage.GetTimeCodesPerSecond())
     start, end = float(stage.GetStartTimeCode()), float(stage.GetEndTimeCode())
     if not stage.HasAuthoredTimeCodeRange():
-        times = [t for mesh in meshes for t in mesh.GetPointsAttr().GetTimeSamples()]
+        times = [t for mesh in meshes for t in _samples(mesh)]
         start, end = (min(times), max(times)) if times else (0.0, 0.0)
     if not (math.isfinite(rate) and rate > 0.0 and math.isfinite(end - start) and end >= start):
         raise MeshError(
@@ -127,6 +127,17 @@ def _codes(stage: Any, request: Request, path: Path, meshes: list[Any]) -> tuple
     if count > MOST_FRAMES:
         raise MeshError(f"{path}: expected at most {MOST_FRAMES} frames, got {count}", kind="file")
     return [start + k * rate / fps for k in range(count)], fps
+
+
+def _samples(mesh: Any) -> Iterator[float]:
+    """Time codes at which the points of a mesh, or what carries it, are given."""
+    geom = optional("pxr.UsdGeom", extra="usd", purpose="reading USD")
+    yield from mesh.GetPointsAttr().GetTimeSamples()
+    prim = mesh.GetPrim()
+    while prim and not prim.IsPseudoRoot():
+        if prim.IsA(geom.Xformable):
+            yield from geom.Xformable(prim).GetTimeSamples()
+        prim = prim.GetParent()
 
 
 class _Part:

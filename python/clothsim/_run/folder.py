@@ -9,26 +9,23 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import hashlib
-import json
 import os
 import shutil
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from clothsim._files import output_error, remove_parts, whole
-from clothsim.errors import CheckpointError, OutputExists
-from clothsim.scene import Scene
+from clothsim._run.sealed import write_sealed
+from clothsim._run.states import FOLDER as STATES
+from clothsim.errors import OutputExists
 
-__all__ = ["OUTPUTS", "RunFolder", "digest", "read_checkpoint"]
+__all__ = ["OUTPUTS", "RunFolder"]
 
 # What a run may write into its folder.
 OUTPUTS = (
     "frames.npz",
+    STATES,
     "obj",
     "ply",
     "scene.usdc",
@@ -41,20 +38,6 @@ OUTPUTS = (
     "report.json",
     "last_good.checkpoint",
 )
-
-
-def digest(scene: Scene) -> str:
-    """Fingerprint of a scene and all its arrays."""
-    sha = hashlib.sha256(scene.check().to_json().encode())
-    for group in scene.assets():
-        for name, arrays in sorted(group.items()):
-            sha.update(name.encode())
-            for array in arrays if isinstance(arrays, tuple) else (arrays,):
-                if isinstance(array, np.ndarray):
-                    sha.update(str(array.shape).encode() + array.tobytes())
-                elif array:  # groups, a rate
-                    sha.update(json.dumps(array, sort_keys=True).encode())
-    return sha.hexdigest()
 
 
 class RunFolder:
@@ -117,6 +100,7 @@ class RunFolder:
         for path in (*self._checkpoints, self.work / "frames.bin", self.work / "frames.jsonl"):
             with contextlib.suppress(FileNotFoundError):
                 path.unlink()
+        shutil.rmtree(self.work / STATES, ignore_errors=True)
 
     @property
     def word(self) -> Path:
@@ -153,13 +137,9 @@ class RunFolder:
 
     def save_checkpoint(self, header: dict[str, Any], engine: bytes) -> None:
         """Write a checkpoint; the last one becomes the one before."""
-        content = json.dumps(header).encode() + b"\n" + engine
         last, before = self._checkpoints
         with whole(last) as file:
-            file.write(b"%d %08x\n" % (len(content), zlib.crc32(content)))
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())  # before the one before goes
+            write_sealed(file, header, engine)  # on the disk before the one before goes
             if last.exists():
                 _keep(last, before)
 
@@ -174,27 +154,3 @@ def _keep(path: Path, copy: Path) -> None:
         os.replace(path, copy)
         return
     os.replace(part, copy)
-
-
-def read_checkpoint(path: Path) -> tuple[dict[str, Any], bytes]:
-    """Header and engine bytes of a checkpoint.
-
-    Raises
-    ------
-    CheckpointError
-        It cannot be read, was cut off or damaged.
-    """
-    try:
-        first, _, content = path.read_bytes().partition(b"\n")
-    except OSError as error:
-        raise CheckpointError(f"{path}: cannot read: {error.strerror}") from error
-    size, _, checksum = first.partition(b" ")
-    if not (size.isdigit() and len(checksum) == 8):
-        raise CheckpointError(f"{path}: expected a checkpoint, got other bytes")
-    if int(size) != len(content):
-        raise CheckpointError(f"{path}: expected {int(size)} bytes, got {len(content)}: cut off, or with a tail")
-    if b"%08x" % zlib.crc32(content) != checksum:
-        raise CheckpointError(f"{path}: its bytes do not have its checksum: damaged")
-    line, _, engine = content.partition(b"\n")
-    header: dict[str, Any] = json.loads(line)
-    return header, engine

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import logging
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -17,16 +15,21 @@ import numpy as np
 from clothsim._device import check_device
 from clothsim._frames import frame_lengths, moving_positions, standing_positions
 from clothsim._progress import progress_bar
+from clothsim._run.digests import array_digest, digest
 from clothsim._run.facts import FrameFacts
-from clothsim._run.folder import RunFolder, digest, read_checkpoint
+from clothsim._run.folder import RunFolder
 from clothsim._run.frames import FrameWriter
 from clothsim._run.outputs import Outputs, check_packages
+from clothsim._run.sealed import read_sealed
+from clothsim._run.signals import Signals
 from clothsim._run.start import Start
+from clothsim._run.states import StateWriter
 from clothsim._scene_facts import contact_thickness
 from clothsim.errors import (
     CheckpointError,
     ClothSimError,
     DeviceError,
+    InvalidInput,
     OutputExists,
     SimulationDiverged,
     SimulationStuck,
@@ -39,6 +42,9 @@ from clothsim.simulation import Simulation
 __all__ = ["Finished", "Job", "Stopped"]
 
 _logger = logging.getLogger(__name__)
+
+# A time is that of a frame of a scene but for rounding if it is so near to it [frames].
+_ON_A_FRAME = 1e-6
 
 
 class Stopped(Exception):
@@ -193,11 +199,19 @@ class Job:
 
     def _lengths(self) -> list[float]:
         """Time from each frame to the next [s], to the end of the scene or as many frames as are asked for."""
+        whole, fps = self.scene.duration, float(self.scene.output["fps"])
         begin = 0.0 if self.start is None else self.start.time
-        return frame_lengths(max(0.0, self.scene.duration - begin), float(self.scene.output["fps"]))[: self.frames]
+        done = round(begin * fps)
+        if abs(begin * fps - done) < _ON_A_FRAME:  # the lengths of the whole run, to the bit
+            return frame_lengths(whole, fps)[done:][: self.frames]
+        return frame_lengths(max(0.0, whole - begin), fps)[: self.frames]
 
     def _new_simulation(self) -> Simulation:
         if self.start is not None:
+            if not self._lengths():
+                expected = f"a time before the scene's end, duration = {self.scene.duration:g} s"
+                got = f"{self.start.time:g} s"
+                raise InvalidInput(f"frame: expected {expected}, got {got}", name="frame", expected=expected, got=got)
             return Simulation._from_start(
                 self.scene, self.start, self.threads, self.device, allow_intersections=self.allow_intersections
             )
@@ -213,19 +227,21 @@ class Job:
                 _logger.warning("%s", warning)
         fps = float(settings["fps"])
         lengths = self._lengths()
-        bodies = simulation.bodies if self.start is None else self.start.undeformed(simulation.bodies)
+        bodies = simulation.bodies if self.start is None else self.start.undeformed(simulation)
         standing = standing_positions(bodies, simulation.collider_positions)
         every = round(float(settings["checkpoint_interval"]) * fps)
         moving = sum(b.vertex_count for b in bodies if not b.static)
         with_velocities = bool(settings["velocities"])
         facts = FrameFacts(simulation, header)
+        states = self._states(folder, fingerprint, len(lengths))
+        states.take_back(writer.frames)
 
         def checkpoint() -> None:
             writer.sync()
             folder.save_checkpoint(facts.header(writer.frames, fingerprint), simulation._core.checkpoint(facts.steps))
 
         try:
-            error = self._simulate(simulation, lengths, writer, facts, checkpoint, every)
+            error = self._simulate(simulation, lengths, writer, facts, states, checkpoint, every)
             lines = writer.facts()
             times = np.array([line["time"] for line in lines])
             scene = self.scene.to_dict()
@@ -236,7 +252,7 @@ class Job:
                 thickness=contact_thickness(scene),
             )  # fmt: skip
             outputs = Outputs(
-                self.out, settings, recording, lines, simulation, facts.wall_seconds(), error, fingerprint
+                self.out, settings, recording, lines, simulation, facts.wall_seconds(), error, fingerprint, states
             )
             report = outputs.write(progress=self.progress)
             if self.finished is not None:
@@ -255,6 +271,7 @@ class Job:
         lengths: list[float],
         writer: FrameWriter,
         facts: FrameFacts,
+        states: StateWriter,
         checkpoint: Callable[[], None],
         every: int,
     ) -> SimulationDiverged | SimulationStuck | SolverFailed | None:
@@ -263,7 +280,7 @@ class Job:
         bar = progress_bar(len(lengths) + 1, initial=writer.frames, enabled=self.progress, name=self.scene.name)
         error: SimulationDiverged | SimulationStuck | SolverFailed | None = None
         try:
-            with _Signals() as signals:
+            with Signals() as signals:
                 while writer.frames <= len(lengths):
                     before, stopped = core.step_count, False
                     try:
@@ -287,6 +304,8 @@ class Job:
                         if self.scene.output["velocities"]:
                             rows = np.concatenate([rows, simulation.velocities])
                         writer.append(rows, facts.next(writer.frames))
+                        if states.wants(writer.frames - 1):
+                            states.keep(writer.frames - 1, core)
                         bar.update()
                     if stopped:
                         checkpoint()
@@ -312,7 +331,7 @@ class Job:
         damage: list[str] = []
         for path in folder.checkpoints() if self.resume else []:
             try:
-                header, engine = read_checkpoint(path)
+                header, engine = read_sealed(path)
                 if header.get("digest") != fingerprint:
                     raise CheckpointError(
                         f"{self.out}: the unfinished run is of another scene, or the scene or one of its meshes has "
@@ -334,6 +353,11 @@ class Job:
         simulation = simulation or self._new_simulation()
         return {"frames": 0, "steps": 0, "wall_seconds": 0.0}, simulation, self._writer(folder, simulation, 0)
 
+    def _states(self, folder: RunFolder, fingerprint: str, last: int) -> StateWriter:
+        every = int(self.scene.output["states"])
+        facts = {"scene": self.scene.name, "digest": fingerprint, "arrays": array_digest(self.scene)} if every else {}
+        return StateWriter(folder.out, folder.work, every, last, facts)
+
     def _writer(self, folder: RunFolder, simulation: Simulation, keep: int) -> FrameWriter:
         """The frames in the work folder: rows of what moves, then velocities if they are kept."""
         bodies = simulation.bodies
@@ -345,38 +369,3 @@ class Job:
 
 class _Other(Exception):
     """A checkpoint is whole and belongs to another scene: the one before does so too."""
-
-
-class _Signals:
-    """Ctrl-C and SIGTERM raise only where the engine can stop between two steps; elsewhere they wait."""
-
-    def __init__(self) -> None:
-        self.signum = 0
-        self._inside = False
-        self._before: dict[int, Any] = {}
-
-    def __enter__(self) -> _Signals:
-        for signum in (signal.SIGINT, signal.SIGTERM):
-            with contextlib.suppress(ValueError):  # not the main thread: signals go elsewhere
-                self._before[signum] = signal.signal(signum, self._handle)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for signum, handler in self._before.items():
-            signal.signal(signum, handler)
-
-    def _handle(self, signum: int, _frame: FrameType | None) -> None:
-        self.signum = signum
-        if self._inside:
-            raise KeyboardInterrupt
-
-    @contextlib.contextmanager
-    def raising(self) -> Iterator[None]:
-        """Let signals raise here, one that came before included."""
-        self._inside = True
-        try:
-            if self.signum:
-                raise KeyboardInterrupt
-            yield
-        finally:
-            self._inside = False

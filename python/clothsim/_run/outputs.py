@@ -16,6 +16,7 @@ from clothsim import _core
 from clothsim._export.writers import FORMATS
 from clothsim._files import output_error, write_whole
 from clothsim._run.folder import OUTPUTS
+from clothsim._run.states import FOLDER, StateWriter
 from clothsim.errors import ClothSimError, MissingDependency, OutputError
 from clothsim.recording import Recording, body_facts
 from clothsim.simulation import Simulation
@@ -53,6 +54,7 @@ class Outputs:
         wall_seconds: float,
         error: ClothSimError | None,
         scene_digest: str,
+        states: StateWriter,
     ) -> None:
         self._out = out
         self._settings = settings
@@ -62,6 +64,7 @@ class Outputs:
         self._wall_seconds = wall_seconds
         self._error = error
         self._scene_digest = scene_digest
+        self._states = states
 
     def write(self, *, progress: bool) -> dict[str, Any]:
         """Write everything, the report last; return it without its frames.
@@ -97,7 +100,10 @@ class Outputs:
             raise OutputError(
                 0, f"{self._out}: {'; '.join(failures)}. The simulation itself is kept: --resume writes what is missing"
             )
-        report = self._report(written)
+        states = self._states.finish(len(self._frames))
+        if states:
+            written.append(FOLDER)
+        report = self._report(written, states)
         write_whole(self._out / "report.json", json.dumps(report, indent=1).encode())
         self._remove_stale([*written, "report.json"])
         return {key: value for key, value in report.items() if key != "frames"}
@@ -121,7 +127,7 @@ class Outputs:
             except OSError as error:
                 raise output_error(path, error) from error
 
-    def _report(self, written: list[str]) -> dict[str, Any]:
+    def _report(self, written: list[str], states: list[int]) -> dict[str, Any]:
         summary = json.loads(self._simulation._core.summary())
         intersections = [f["intersections"] for f in self._frames if f["intersections"] is not None]
         return {
@@ -148,5 +154,7 @@ class Outputs:
             "effects": summary["effects"],
             "max_intersections": max(intersections, default=None),
             "outputs": [*written, "report.json"],
+            "states": states,
+            "continued": summary.get("continued"),
             "frames": self._frames,
         }

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from clothsim._frames import standing_positions
-from clothsim._run.folder import RunFolder, read_checkpoint
+from clothsim._run.folder import RunFolder
 from clothsim._run.frames import frames_so_far
+from clothsim._run.sealed import read_sealed as read_checkpoint
 from clothsim._scene_facts import contact_thickness
 from clothsim.errors import CheckpointError, InvalidInput
 from clothsim.recording import Recording

@@ -110,17 +110,19 @@ pub(crate) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::Threa
     let mut levels: Vec<(u32, Range<u32>)> = vec![];
     // Triangles come body by body.
     let body_of = |item: &Item| mesh.vertex_body[mesh.triangles[item.triangle as usize][0] as usize];
+    let mut leaf_count = 0;
     for items in items.chunk_by_mut(|a, b| body_of(a) == body_of(b)) {
-        let body = body_of(&items[0]);
         match pool {
             Some(pool) if items.len() > PARALLEL => pool.install(|| arrange(items)),
             _ => arrange(items),
         }
-        let first = tree.leaves.len() as u32;
-        leaves::push(mesh, items, &mut tree, pool);
-        levels.push((body, first..tree.leaves.len() as u32));
+        let first = leaf_count;
+        leaf_count += items.len().div_ceil(LEAF_TRIANGLES) as u32;
+        levels.push((body_of(&items[0]), first..leaf_count));
     }
-    leaves::number_vertices(mesh, &mut tree, pool);
+    // Within a body only: the triangles have changed their places there.
+    let bodies: Vec<&[Item]> = items.chunk_by(|a, b| body_of(a) == body_of(b)).collect();
+    leaves::fill(mesh, &bodies, &mut tree, pool);
     while levels.iter().any(|(_, level)| level.len() > 1) {
         for (_, level) in &mut levels {
             let start = tree.block_count() as u32;

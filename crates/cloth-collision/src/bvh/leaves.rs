@@ -1,4 +1,6 @@
 //! The leaves of the tree: their triangles and the features that these own.
+//!
+//! Each list is made once at its size, and filled in parallel: how many features each leaf owns is counted before.
 
 use super::LEAF_TRIANGLES;
 use super::build::{Item, Leaf, Tree};
@@ -6,149 +8,200 @@ use crate::CollisionMesh;
 use crate::bounds::LANES;
 use cloth_mesh::NONE;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Leaves per task; fixed, though nothing here depends on it.
+/// Leaves or triangles per task; fixed, though nothing here depends on it.
 const LEAF_CHUNK: usize = 256;
+const TRIANGLE_CHUNK: usize = 2048;
+/// Why a part can be split off.
+const WITHIN: &str = "the lists have room for what was counted";
+/// Features of one kind that the triangles of a leaf own at most, and one more place to write to.
+const MOST: usize = 3 * LEAF_TRIANGLES + 1;
 
-/// Appends the leaves of a body, whose triangles are in their order.
-pub(super) fn push(mesh: &CollisionMesh, items: &[Item], tree: &mut Tree, pool: Option<&rayon::ThreadPool>) {
-    let part = |items: &[Item]| {
-        let mut part = Tree::default();
-        items.chunks(LEAF_TRIANGLES).for_each(|leaf| push_leaf(mesh, leaf, &mut part));
-        part
-    };
-    match pool {
-        Some(pool) if pool.current_num_threads() > 1 && items.len() > LEAF_CHUNK * LEAF_TRIANGLES => {
-            let parts: Vec<Tree> =
-                pool.install(|| items.par_chunks(LEAF_CHUNK * LEAF_TRIANGLES).map(part).collect());
-            append(tree, &parts);
-        }
-        _ => append(tree, &[part(items)]),
-    }
-}
+/// Fills an empty tree with the leaves of the bodies, whose triangles are in their order, and numbers the vertices by the
+/// leaves that own them, so that those of close leaves lie close in memory.
+pub(super) fn fill(
+    mesh: &CollisionMesh,
+    bodies: &[&[Item]],
+    tree: &mut Tree,
+    pool: Option<&rayon::ThreadPool>,
+) {
+    let items: Vec<&[Item]> = bodies.iter().flat_map(|items| items.chunks(LEAF_TRIANGLES)).collect();
+    // A mesh without features has no owners: its leaves hold triangles only.
+    let owned = if mesh.triangle_edges.is_empty() { vec![] } else { owned(mesh, pool) };
+    let mask = |item: &Item| owned.get(item.triangle as usize).copied().unwrap_or(0);
+    let counts = mapped(pool, LEAF_CHUNK, &items, |items| {
+        let count = |bits: u8| items.iter().map(|item| (mask(item) & bits).count_ones()).sum::<u32>();
+        [count(CORNERS), count(SIDES)]
+    });
 
-fn append(tree: &mut Tree, parts: &[Tree]) {
-    fn extend<T: Copy>(list: &mut Vec<T>, parts: &[Tree], of: impl Fn(&Tree) -> &Vec<T>) {
-        list.reserve(parts.iter().map(|part| of(part).len()).sum());
-        for part in parts {
-            list.extend_from_slice(of(part));
-        }
+    let mut leaf = Leaf { count: 0, vertex_blocks: [0; 2], edge_blocks: [0; 2] };
+    let mut first_rank = 0;
+    let mut first_ranks = Vec::with_capacity(items.len());
+    tree.leaves = Vec::with_capacity(items.len());
+    for (items, &[vertices, edges]) in items.iter().zip(&counts) {
+        let after = |blocks: [u32; 2], count: u32| [blocks[1], blocks[1] + count.div_ceil(LANES as u32)];
+        leaf = Leaf {
+            count: items.len() as u32,
+            vertex_blocks: after(leaf.vertex_blocks, vertices),
+            edge_blocks: after(leaf.edge_blocks, edges),
+        };
+        tree.leaves.push(leaf);
+        first_ranks.push(first_rank);
+        first_rank += vertices;
     }
-    tree.leaves.reserve(parts.iter().map(|part| part.leaves.len()).sum());
-    let (mut vertex_block, mut edge_block) = (tree.vertex_ids.len() as u32, tree.edge_ids.len() as u32);
-    for part in parts {
-        tree.leaves.extend(part.leaves.iter().map(|leaf| Leaf {
-            count: leaf.count,
-            vertex_blocks: leaf.vertex_blocks.map(|k| k + vertex_block),
-            edge_blocks: leaf.edge_blocks.map(|k| k + edge_block),
-        }));
-        vertex_block += part.vertex_ids.len() as u32;
-        edge_block += part.edge_ids.len() as u32;
-    }
-    extend(&mut tree.triangle_ids, parts, |part| &part.triangle_ids);
-    extend(&mut tree.corners, parts, |part| &part.corners);
-    extend(&mut tree.vertex_ids, parts, |part| &part.vertex_ids);
-    extend(&mut tree.edge_ids, parts, |part| &part.edge_ids);
-    extend(&mut tree.edge_ends, parts, |part| &part.edge_ends);
-}
-
-/// Numbers the vertices by the leaves that own them, so that those of close leaves lie close in memory.
-pub(super) fn number_vertices(mesh: &CollisionMesh, tree: &mut Tree, pool: Option<&rayon::ThreadPool>) {
-    let mut ranks = vec![NONE; mesh.vertex_count];
-    tree.vertex_order = Vec::with_capacity(tree.vertex_ids.iter().flatten().filter(|&&v| v != NONE).count());
-    for &v in tree.vertex_ids.iter().flatten().filter(|&&v| v != NONE) {
-        ranks[v as usize] = tree.vertex_order.len() as u32;
-        tree.vertex_order.push(v);
-    }
-    // A mesh without features numbers none.
-    if tree.vertex_order.is_empty() {
+    tree.triangle_ids = mapped(pool, LEAF_CHUNK, &items, |items| in_lanes(items, |t| t));
+    tree.corners = mapped(pool, LEAF_CHUNK, &items, |items| {
+        [0, 1, 2].map(|k| in_lanes(items, |t| mesh.triangles[t as usize][k]))
+    });
+    if owned.is_empty() {
         return;
     }
-    let rank = |v: u32| if v == NONE { NONE } else { ranks[v as usize] };
-    let of_vertices = || tree.vertex_ids.iter().map(|ids| ids.map(rank)).collect();
-    let of_triangle = |leaf: &[[u32; LANES]; 3]| -> [[u32; 3]; LANES] {
-        std::array::from_fn(|lane| std::array::from_fn(|k| rank(leaf[k][lane])))
-    };
-    let of_edge = |block: &[[u32; LANES]; 2]| -> [[u32; 2]; LANES] {
-        std::array::from_fn(|lane| [rank(block[0][lane]), rank(block[1][lane])])
-    };
-    let (vertices, triangles, edges): (_, Vec<_>, Vec<_>) = match pool {
-        Some(pool) => pool.install(|| {
-            (
-                of_vertices(),
-                tree.corners.par_iter().with_min_len(LEAF_CHUNK).map(of_triangle).collect(),
-                tree.edge_ends.par_iter().with_min_len(LEAF_CHUNK).map(of_edge).collect(),
-            )
-        }),
-        None => (
-            of_vertices(),
-            tree.corners.iter().map(of_triangle).collect(),
-            tree.edge_ends.iter().map(of_edge).collect(),
-        ),
-    };
-    tree.vertex_ranks = vertices;
-    tree.triangle_ranks = triangles.into_flattened();
-    tree.edge_ranks = edges.into_flattened();
+
+    tree.vertex_order = vec![0; first_rank as usize];
+    tree.vertex_ids = vec![[NONE; LANES]; leaf.vertex_blocks[1] as usize];
+    tree.vertex_ranks = tree.vertex_ids.clone();
+    tree.edge_ids = vec![[NONE; LANES]; leaf.edge_blocks[1] as usize];
+    tree.edge_ends = vec![[[NONE; LANES]; 2]; leaf.edge_blocks[1] as usize];
+    let mut ranks = Vec::with_capacity(mesh.vertex_count);
+    ranks.resize_with(mesh.vertex_count, || AtomicU32::new(NONE));
+    let parts = parts(tree, &items, &first_ranks);
+    each(pool, parts, |part| part.fill(mesh, &mask, &ranks));
+
+    let rank = |v: u32| if v == NONE { NONE } else { ranks[v as usize].load(Ordering::Relaxed) };
+    tree.triangle_ranks = mapped(pool, LEAF_CHUNK, &tree.corners, |corners| -> [[u32; 3]; LANES] {
+        std::array::from_fn(|lane| [0, 1, 2].map(|k| rank(corners[k][lane])))
+    })
+    .into_flattened();
+    tree.edge_ranks = mapped(pool, LEAF_CHUNK, &tree.edge_ends, |ends| -> [[u32; 2]; LANES] {
+        std::array::from_fn(|lane| [0, 1].map(|k| rank(ends[k][lane])))
+    })
+    .into_flattened();
 }
 
-fn push_leaf(mesh: &CollisionMesh, items: &[Item], tree: &mut Tree) {
-    let mut triangles = [NONE; LANES];
-    let mut corners = [[NONE; LANES]; 3];
-    let (first_vertex_block, first_edge_block) = (tree.vertex_ids.len() as u32, tree.edge_ids.len() as u32);
-    // A mesh without features has no owners: its leaves hold triangles only.
-    let has_features = !mesh.triangle_edges.is_empty();
-    let (mut vertices, mut edges) = (Features::default(), Features::default());
-    for (lane, item) in items.iter().enumerate() {
-        let t = item.triangle;
-        triangles[lane] = t;
-        for k in 0..3 {
-            let v = mesh.triangles[t as usize][k];
-            corners[k][lane] = v;
-            if has_features {
-                let e = mesh.triangle_edges[t as usize][k];
-                vertices.push_if(mesh.vertex_owner[v as usize] == t, v);
-                edges.push_if(mesh.edge_owner[e as usize] == t, e);
+/// Bits of what a triangle owns: its corners, and its sides as [`CollisionMesh::triangle_edges`] has them.
+const CORNERS: u8 = 0b111;
+const SIDES: u8 = 0b11_1000;
+
+fn owned(mesh: &CollisionMesh, pool: Option<&rayon::ThreadPool>) -> Vec<u8> {
+    let numbers: Vec<u32> = (0..mesh.triangles.len() as u32).step_by(TRIANGLE_CHUNK).collect();
+    let of_chunk = |&first: &u32| -> Vec<u8> {
+        let chunk = first as usize..mesh.triangles.len().min(first as usize + TRIANGLE_CHUNK);
+        let both = mesh.triangles[chunk.clone()].iter().zip(&mesh.triangle_edges[chunk]);
+        let of_triangle = |(t, (corners, sides)): (u32, (&[u32; 3], &[u32; 3]))| {
+            (0..3).fold(0, |mask, k| {
+                let corner = u8::from(mesh.vertex_owner[corners[k] as usize] == t);
+                mask | corner << k | u8::from(mesh.edge_owner[sides[k] as usize] == t) << (k + 3)
+            })
+        };
+        (first..).zip(both).map(of_triangle).collect()
+    };
+    mapped(pool, 1, &numbers, of_chunk).concat()
+}
+
+fn in_lanes(items: &[Item], of: impl Fn(u32) -> u32) -> [u32; LANES] {
+    std::array::from_fn(|lane| items.get(lane).map_or(NONE, |item| of(item.triangle)))
+}
+
+/// Some leaves in a row, and their part of the lists of features.
+struct Part<'a> {
+    leaves: &'a [Leaf],
+    items: &'a [&'a [Item]],
+    first_ranks: &'a [u32],
+    vertex_order: &'a mut [u32],
+    vertex_ids: &'a mut [[u32; LANES]],
+    vertex_ranks: &'a mut [[u32; LANES]],
+    edge_ids: &'a mut [[u32; LANES]],
+    edge_ends: &'a mut [[[u32; LANES]; 2]],
+}
+
+fn parts<'a>(tree: &'a mut Tree, items: &'a [&'a [Item]], first_ranks: &'a [u32]) -> Vec<Part<'a>> {
+    let Tree { leaves, vertex_order, vertex_ids, vertex_ranks, edge_ids, edge_ends, .. } = tree;
+    let mut order = &mut vertex_order[..];
+    let (mut ids, mut ranks) = (&mut vertex_ids[..], &mut vertex_ranks[..]);
+    let (mut edges, mut ends) = (&mut edge_ids[..], &mut edge_ends[..]);
+    let vertex_count = order.len();
+    let mut parts = Vec::with_capacity(leaves.len() / LEAF_CHUNK + 1);
+    for first in (0..leaves.len()).step_by(LEAF_CHUNK) {
+        let after = leaves.len().min(first + LEAF_CHUNK);
+        let own = &leaves[first..after];
+        let blocks = |of: fn(&Leaf) -> [u32; 2]| (of(&own[own.len() - 1])[1] - of(&own[0])[0]) as usize;
+        let next_rank = first_ranks.get(after).map_or(vertex_count, |&rank| rank as usize);
+        let (vertex_blocks, edge_blocks) =
+            (blocks(|leaf| leaf.vertex_blocks), blocks(|leaf| leaf.edge_blocks));
+        parts.push(Part {
+            leaves: own,
+            items: &items[first..after],
+            first_ranks: &first_ranks[first..after],
+            vertex_order: order.split_off_mut(..next_rank - first_ranks[first] as usize).expect(WITHIN),
+            vertex_ids: ids.split_off_mut(..vertex_blocks).expect(WITHIN),
+            vertex_ranks: ranks.split_off_mut(..vertex_blocks).expect(WITHIN),
+            edge_ids: edges.split_off_mut(..edge_blocks).expect(WITHIN),
+            edge_ends: ends.split_off_mut(..edge_blocks).expect(WITHIN),
+        });
+    }
+    parts
+}
+
+impl Part<'_> {
+    /// Notes the features of the leaves and the rank of each vertex.
+    fn fill(self, mesh: &CollisionMesh, mask: &impl Fn(&Item) -> u8, ranks: &[AtomicU32]) {
+        let Some(&Leaf { vertex_blocks: [first_vertex, _], edge_blocks: [first_edge, _], .. }) =
+            self.leaves.first()
+        else {
+            return;
+        };
+        for (k, (leaf, items)) in self.leaves.iter().zip(self.items).enumerate() {
+            // Every feature is written, and the next one over it if it is not owned: no branch on what is hard to foresee.
+            let (mut vertices, mut vertex_count) = ([0; MOST], 0);
+            let (mut edges, mut edge_count) = ([[0; 3]; MOST], 0);
+            for item in *items {
+                let (t, mask) = (item.triangle as usize, mask(item));
+                let (corners, sides) = (mesh.triangles[t], mesh.triangle_edges[t]);
+                for side in 0..3 {
+                    let (a, b) = (corners[side], corners[(side + 1) % 3]);
+                    vertices[vertex_count] = a;
+                    vertex_count += usize::from(mask >> side & 1);
+                    edges[edge_count] = [sides[side], a.min(b), a.max(b)];
+                    edge_count += usize::from(mask >> (side + 3) & 1);
+                }
+            }
+            let first_rank = self.first_ranks[k];
+            let place = (leaf.vertex_blocks[0] - first_vertex) as usize * LANES;
+            let order = &mut self.vertex_order[(first_rank - self.first_ranks[0]) as usize..];
+            for (n, &v) in vertices[..vertex_count].iter().enumerate() {
+                let rank = first_rank + n as u32;
+                self.vertex_ids.as_flattened_mut()[place + n] = v;
+                self.vertex_ranks.as_flattened_mut()[place + n] = rank;
+                order[n] = v;
+                ranks[v as usize].store(rank, Ordering::Relaxed);
+            }
+            let block = (leaf.edge_blocks[0] - first_edge) as usize;
+            for (n, &[e, lower, higher]) in edges[..edge_count].iter().enumerate() {
+                let (block, lane) = (block + n / LANES, n % LANES);
+                self.edge_ids[block][lane] = e;
+                (self.edge_ends[block][0][lane], self.edge_ends[block][1][lane]) = (lower, higher);
             }
         }
     }
-    vertices.push_blocks(&mut tree.vertex_ids);
-    edges.push_blocks(&mut tree.edge_ids);
-    for ids in &tree.edge_ids[first_edge_block as usize..] {
-        let mut ends = [[NONE; LANES]; 2];
-        for (lane, &e) in ids.iter().enumerate().filter(|&(_, &e)| e != NONE) {
-            [ends[0][lane], ends[1][lane]] = mesh.edges[e as usize];
-        }
-        tree.edge_ends.push(ends);
-    }
-    tree.triangle_ids.push(triangles);
-    tree.corners.push(corners);
-    tree.leaves.push(Leaf {
-        count: items.len() as u32,
-        vertex_blocks: [first_vertex_block, tree.vertex_ids.len() as u32],
-        edge_blocks: [first_edge_block, tree.edge_ids.len() as u32],
-    });
 }
 
-/// Features of one kind that the triangles of a leaf own.
-#[derive(Default)]
-struct Features {
-    ids: [u32; 3 * LEAF_TRIANGLES],
-    count: usize,
+/// The values of a list, in its order.
+fn mapped<T: Sync, U: Send>(
+    pool: Option<&rayon::ThreadPool>,
+    at_least: usize,
+    list: &[T],
+    value: impl Fn(&T) -> U + Sync + Send,
+) -> Vec<U> {
+    match pool {
+        Some(pool) => pool.install(|| list.par_iter().with_min_len(at_least).map(value).collect()),
+        None => list.iter().map(value).collect(),
+    }
 }
 
-impl Features {
-    fn push_if(&mut self, is_owned: bool, id: u32) {
-        if is_owned {
-            self.ids[self.count] = id;
-            self.count += 1;
-        }
-    }
-
-    fn push_blocks(&self, blocks: &mut Vec<[u32; LANES]>) {
-        for chunk in self.ids[..self.count].chunks(LANES) {
-            let mut block = [NONE; LANES];
-            block[..chunk.len()].copy_from_slice(chunk);
-            blocks.push(block);
-        }
+fn each<T: Send>(pool: Option<&rayon::ThreadPool>, list: Vec<T>, work: impl Fn(T) + Sync + Send) {
+    match pool {
+        Some(pool) => pool.install(|| list.into_par_iter().with_max_len(1).for_each(work)),
+        None => list.into_iter().for_each(work),
     }
 }

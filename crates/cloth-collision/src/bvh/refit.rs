@@ -2,7 +2,7 @@
 
 use super::build::{Leaf, Tree};
 use crate::CollisionMesh;
-use crate::bounds::{Block, LANES, MovingBox};
+use crate::bounds::{Block, LANES, MovingBox, fit};
 use cloth_mesh::NONE;
 use rayon::prelude::*;
 
@@ -116,11 +116,11 @@ impl<const ENDS: usize> Boxes<ENDS> {
                 for (leaf, _) in leaves.iter().zip(wanted).filter(|(_, wanted)| **wanted) {
                     for k in leaf.vertex_blocks[0]..leaf.vertex_blocks[1] {
                         let corners = std::array::from_ref(&tree.vertex_ids[k as usize]);
-                        fill_one(&mut vertex_chunk[(k - first_vertex) as usize], corners, vertices);
+                        fit(&mut vertex_chunk[(k - first_vertex) as usize], corners, vertices);
                     }
                     for k in leaf.edge_blocks[0]..leaf.edge_blocks[1] {
                         let ends = &tree.edge_ends[k as usize];
-                        fill_one(&mut edge_chunk[(k - first_edge) as usize], ends, vertices);
+                        fit(&mut edge_chunk[(k - first_edge) as usize], ends, vertices);
                     }
                 }
             });
@@ -148,12 +148,12 @@ impl<const ENDS: usize> Boxes<ENDS> {
         let range = |[first, end]: [u32; 2]| first as usize..end as usize;
         let of_vertices = range(tree.leaves[leaf].vertex_blocks);
         let of_edges = range(tree.leaves[leaf].edge_blocks);
-        fill_one(&mut blocks[leaf], &tree.corners[leaf], vertices);
+        fit(&mut blocks[leaf], &tree.corners[leaf], vertices);
         for k in of_vertices {
-            fill_one(&mut vertex_blocks[k], std::array::from_ref(&tree.vertex_ids[k]), vertices);
+            fit(&mut vertex_blocks[k], std::array::from_ref(&tree.vertex_ids[k]), vertices);
         }
         for k in of_edges {
-            fill_one(&mut edge_blocks[k], &tree.edge_ends[k], vertices);
+            fit(&mut edge_blocks[k], &tree.edge_ends[k], vertices);
         }
         hulls[leaf] = blocks[leaf].hull();
     }
@@ -185,22 +185,6 @@ fn fitted<const ENDS: usize, const N: usize>(
     vertices: &[MovingBox<ENDS>],
 ) -> Block<ENDS> {
     let mut block = Block::EMPTY;
-    fill_one(&mut block, corners, vertices);
+    fit(&mut block, corners, vertices);
     block
-}
-
-/// Fits a block to the boxes of its features' vertices, `[corner][lane]`.
-#[inline]
-fn fill_one<const ENDS: usize, const N: usize>(
-    block: &mut Block<ENDS>,
-    corners: &[[u32; LANES]; N],
-    vertices: &[MovingBox<ENDS>],
-) {
-    for lane in (0..LANES).filter(|&lane| corners[0][lane] != NONE) {
-        let mut bounds = vertices[corners[0][lane] as usize];
-        for corner in &corners[1..] {
-            bounds.grow(&vertices[corner[lane] as usize]);
-        }
-        block.set(lane, &bounds);
-    }
 }

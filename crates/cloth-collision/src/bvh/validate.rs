@@ -75,6 +75,9 @@ impl Bvh {
             if tree.edge_ranks[place].map(vertex) != mesh.edges[e] {
                 return Err(format!("ranks of edge {e}"));
             }
+            if [0, 1].map(|end| tree.edge_ends[place / LANES][end][place % LANES]) != mesh.edges[e] {
+                return Err(format!("ends of edge {e}"));
+            }
         }
         Ok(())
     }
@@ -148,6 +151,7 @@ mod tests {
         assert!(fault(&|b| b.tree.vertex_ids[0][0] = cloth_mesh::NONE).contains("vertex"));
         assert!(fault(&|b| b.tree.vertex_order.swap(0, 1)).contains("rank of vertex"));
         assert!(fault(&|b| b.tree.edge_ranks.swap(0, 1)).contains("ranks of edge"));
+        assert!(fault(&|b| b.tree.edge_ends[1][0].swap(2, 3)).contains("ends of edge"));
         assert!(fault(&|b| b.tree.triangle_ranks.swap(0, 1)).contains("ranks of triangle"));
         assert!(fault(&|b| b.tree.inner[0].first += 1).contains("parents"));
         assert!(fault(&|b| b.tree.inner[0].count = 0).contains("children"));

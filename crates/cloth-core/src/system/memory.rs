@@ -74,6 +74,13 @@ impl ClothSystem {
         list.into_iter().filter(|memory| !memory.is_empty()).map(|memory| memory.numbers()).collect()
     }
 
+    /// Whose memories [`Self::memories`] lists: the vertices of the elements, one element after the other, and whether only those
+    /// remember that must.
+    pub fn rememberers(&self) -> Vec<(&[u32], bool)> {
+        let list = self.all_models().filter(|(_, memory)| !memory.is_empty());
+        list.map(|(model, memory)| (model.vertices(), memory.needed().is_some())).collect()
+    }
+
     /// The memory of each model, moved on to `x` if an accepted motion waits for it.
     pub(super) fn memory_by_model(&self, x: &[Vec3]) -> Vec<Cow<'_, Memory>> {
         let mut list = Vec::new();

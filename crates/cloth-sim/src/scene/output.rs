@@ -25,6 +25,9 @@ pub struct Output {
     pub vtk: bool,
     /// Velocities of the cloth beside the positions in the NumPy archive: a run can then go on from any frame as it went.
     pub velocities: bool,
+    /// Every so many frames, and at the last one, the full state is kept, from which `clothsim run --from` goes on to the same bits,
+    /// also with an edited scene; 0: none.
+    pub states: u32,
     /// A picture of several frames side by side.
     pub film_strip: bool,
     /// Energies and timings over time.
@@ -45,6 +48,7 @@ impl Default for Output {
             pc2: false,
             vtk: false,
             velocities: false,
+            states: 0,
             film_strip: true,
             plots: true,
             checkpoint_interval: 0.5,

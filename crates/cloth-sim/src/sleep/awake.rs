@@ -96,7 +96,7 @@ impl Simulation {
     }
 
     /// The same, one list per cloth of [`Simulation::remembering`].
-    fn memories(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn memories(&self) -> Vec<Vec<f64>> {
         let mut memories = self.integrator.system().memories(&self.state.x);
         let Some(awake) = self.sleeper.as_ref().and_then(|s| s.awake.as_ref()) else { return memories };
         let Some(integrator) = &awake.integrator else { return memories };

@@ -1,7 +1,7 @@
 //! [`super::Pairing::Avx512`]: comparisons end in masks, two blocks of edges are one register, pairs are written at once.
 
 use super::{PlacePairs, Places};
-use crate::bounds::{Block, Bounds, LANES, lanes};
+use crate::bounds::{Block, Bounds, LANES, MovingBox, lanes};
 use crate::bvh::build::Tree;
 use crate::bvh::refit::Boxes;
 use cloth_mesh::NONE;
@@ -94,6 +94,23 @@ fn used_lanes(ids: &[u32; LANES]) -> u32 {
     u32::from(!_mm256_cmpeq_epi32_mask(load_eight(ids), _mm256_set1_epi32(NONE as i32)))
 }
 
+/// Bit per feature of the blocks of a leaf, at most 3 · [`LANES`]: its box may touch the hull.
+#[inline]
+#[target_feature(enable = "avx512f,avx512vl,bmi1,bmi2,popcnt")]
+fn near<const ENDS: usize>(
+    bounds: &[Block<ENDS>],
+    ids: &[[u32; LANES]],
+    [first, end]: [u32; 2],
+    hull: &MovingBox<ENDS>,
+) -> u32 {
+    let mut near = 0;
+    for (k, block) in (first..end).enumerate() {
+        let touching = Eight::load(&bounds[block as usize]).overlaps(hull);
+        near |= (touching & used_lanes(&ids[block as usize])) << (k * LANES);
+    }
+    near
+}
+
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,bmi1,bmi2,popcnt")]
 fn vertices_and_triangles<const ENDS: usize>(
@@ -105,37 +122,34 @@ fn vertices_and_triangles<const ENDS: usize>(
 ) {
     let [first, end] = tree.leaves[leaf as usize].vertex_blocks;
     let (hull, used) = (&boxes.hulls[other as usize], boxes.lanes[other as usize].used);
-    let near = |block: u32| {
-        Eight::load(&boxes.vertex_blocks[block as usize]).overlaps(hull)
-            & used_lanes(&tree.vertex_ids[block as usize])
-    };
-    // More blocks have no near vertex than one does.
-    let Some(first) = (first..end).find(|&block| near(block) != 0) else { return };
+    let near = near(&boxes.vertex_blocks, &tree.vertex_ids, [first, end], hull);
+    if near == 0 {
+        return;
+    }
     let triangles = Eight::load(&boxes.blocks[other as usize]);
     let corners = &tree.corners[other as usize];
     let corners = [load_eight(&corners[0]), load_eight(&corners[1]), load_eight(&corners[2])];
     let order = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
     let places = _mm256_add_epi32(_mm256_set1_epi32((other * LANES as u32) as i32), order);
     out.reserve((end - first) as usize * LANES * LANES + LANES);
-    for block in first..end {
+    for vertex in lanes(near) {
+        let (block, lane) = (first + (vertex / LANES) as u32, vertex % LANES);
         let (vertices, ids) = (&boxes.vertex_blocks[block as usize], &tree.vertex_ids[block as usize]);
-        for lane in lanes(near(block)) {
-            let id = _mm256_set1_epi32(ids[lane] as i32);
-            let shared = _mm256_cmpeq_epi32_mask(corners[0], id)
-                | _mm256_cmpeq_epi32_mask(corners[1], id)
-                | _mm256_cmpeq_epi32_mask(corners[2], id);
-            let hits = (triangles.overlaps(&(vertices, lane)) & used) as u8 & !shared;
-            let own = _mm256_set1_epi32((block * LANES as u32) as i32 + lane as i32);
-            let end = out.first.len();
-            // SAFETY: the reserved room holds all pairs of these leaves and the lanes written beyond the last one; the
-            // entries that are kept are written here.
-            unsafe {
-                _mm256_storeu_si256(out.first.as_mut_ptr().add(end).cast(), own);
-                let hit = _mm256_maskz_compress_epi32(hits, places);
-                _mm256_storeu_si256(out.second.as_mut_ptr().add(end).cast(), hit);
-                out.first.set_len(end + hits.count_ones() as usize);
-                out.second.set_len(end + hits.count_ones() as usize);
-            }
+        let id = _mm256_set1_epi32(ids[lane] as i32);
+        let shared = _mm256_cmpeq_epi32_mask(corners[0], id)
+            | _mm256_cmpeq_epi32_mask(corners[1], id)
+            | _mm256_cmpeq_epi32_mask(corners[2], id);
+        let hits = (triangles.overlaps(&(vertices, lane)) & used) as u8 & !shared;
+        let own = _mm256_set1_epi32((block * LANES as u32) as i32 + lane as i32);
+        let end = out.first.len();
+        // SAFETY: the reserved room holds all pairs of these leaves and the lanes written beyond the last one; the
+        // entries that are kept are written here.
+        unsafe {
+            _mm256_storeu_si256(out.first.as_mut_ptr().add(end).cast(), own);
+            let hit = _mm256_maskz_compress_epi32(hits, places);
+            _mm256_storeu_si256(out.second.as_mut_ptr().add(end).cast(), hit);
+            out.first.set_len(end + hits.count_ones() as usize);
+            out.second.set_len(end + hits.count_ones() as usize);
         }
     }
 }
@@ -213,13 +227,6 @@ impl<const ENDS: usize> Sixteen<ENDS> {
         !apart
     }
 
-    /// Bit per lane: the lane is used.
-    #[inline]
-    #[target_feature(enable = "avx512f,avx512vl,bmi1,bmi2,popcnt")]
-    fn used(&self) -> u16 {
-        !_mm512_cmpeq_epi32_mask(self.ids, _mm512_set1_epi32(NONE as i32))
-    }
-
     /// Bit per lane: the edge has that vertex.
     #[inline]
     #[target_feature(enable = "avx512f,avx512vl,bmi1,bmi2,popcnt")]
@@ -232,34 +239,35 @@ impl<const ENDS: usize> Sixteen<ENDS> {
 #[inline]
 #[target_feature(enable = "avx512f,avx512vl,bmi1,bmi2,popcnt")]
 fn edges<const ENDS: usize>(tree: &Tree, boxes: &Boxes<ENDS>, a: u32, b: u32, out: &mut PlacePairs) {
-    let [first_a, end_a] = tree.leaves[a as usize].edge_blocks;
-    let [first_b, end_b] = tree.leaves[b as usize].edge_blocks;
-    let (hull_a, hull_b) = (&boxes.hulls[a as usize], &boxes.hulls[b as usize]);
-    // Bit per edge of `a`: it is near `b`.
-    let mut near_a = 0_u32;
-    for (k, block) in (first_a..end_a).enumerate() {
-        let near = Eight::load(&boxes.edge_blocks[block as usize]).overlaps(hull_b);
-        near_a |= (near & used_lanes(&tree.edge_ids[block as usize])) << (k * LANES);
-    }
-    if near_a == 0 {
+    let of_leaf = |leaf: u32, other: u32| {
+        let blocks = tree.leaves[leaf as usize].edge_blocks;
+        (blocks, near(&boxes.edge_blocks, &tree.edge_ids, blocks, &boxes.hulls[other as usize]))
+    };
+    let own = of_leaf(a, b);
+    if own.1 == 0 {
         return;
     }
-    out.reserve((end_a - first_a) as usize * LANES * ((end_b - first_b) as usize + 1) * LANES + TWO);
+    let others = if a == b { own } else { of_leaf(b, a) };
+    // The fewer edges one by one, the others in lanes.
+    let swaps = others.1.count_ones() < own.1.count_ones();
+    let (([first, end], near), ([first_other, end_other], near_others)) =
+        if swaps { (others, own) } else { (own, others) };
+    out.reserve((end - first) as usize * LANES * ((end_other - first_other) as usize + 1) * LANES + TWO);
     let order = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-    for block_b in (first_b..end_b).step_by(2) {
-        let others = Sixteen::load(tree, boxes, block_b, end_b);
-        let near = others.overlaps(hull_a) & others.used();
-        if near == 0 {
+    for block_other in (first_other..end_other).step_by(2) {
+        let near_others = (near_others >> ((block_other - first_other) as usize * LANES)) as u16;
+        if near_others == 0 {
             continue;
         }
-        let places = _mm512_add_epi32(_mm512_set1_epi32((block_b * LANES as u32) as i32), order);
-        for edge in lanes(near_a) {
-            let (block_a, lane) = (first_a + (edge / LANES) as u32, edge % LANES);
-            let (block, ids) = (&boxes.edge_blocks[block_a as usize], &tree.edge_ids[block_a as usize]);
-            let ends = &tree.edge_ends[block_a as usize];
-            let own = _mm512_set1_epi32((block_a * LANES as u32) as i32 + lane as i32);
+        let others = Sixteen::load(tree, boxes, block_other, end_other);
+        let places = _mm512_add_epi32(_mm512_set1_epi32((block_other * LANES as u32) as i32), order);
+        for edge in lanes(near) {
+            let (block, lane) = (first + (edge / LANES) as u32, edge % LANES);
+            let (bounds, ids) = (&boxes.edge_blocks[block as usize], &tree.edge_ids[block as usize]);
+            let ends = &tree.edge_ends[block as usize];
+            let own = _mm512_set1_epi32((block * LANES as u32) as i32 + lane as i32);
             let shared = others.has_end(ends[0][lane]) | others.has_end(ends[1][lane]);
-            let mut hits = others.overlaps(&(block, lane)) & near & !shared;
+            let mut hits = others.overlaps(&(bounds, lane)) & near_others & !shared;
             if a == b {
                 hits &= _mm512_cmpgt_epu32_mask(places, own);
             }
