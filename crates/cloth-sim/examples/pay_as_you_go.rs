@@ -1,9 +1,9 @@
 //! Steps a hanging sheet and prints the bytes in use, for `benches/pay_as_you_go.py`, which counts the instructions.
 //!
 //! `pay_as_you_go minimal STEPS N` steps the integrator of `cloth-core` alone, by hand: springs, gravity, two held corners, and nothing
-//! that knows of any effect. `pay_as_you_go SCENE.toml STEPS` steps the whole engine. Both print the bytes that live after the build
-//! and after the steps, and the height of the lowest vertex. `pay_as_you_go plan SCENE.toml` prints the effects that are off, and
-//! refuses one of them with elements or bytes.
+//! that knows of any effect; `linear` does so without the integrator's test for turns. `pay_as_you_go SCENE.toml STEPS` steps the
+//! whole engine. All print the bytes that live after the build and after the steps, and the height of the lowest vertex.
+//! `pay_as_you_go plan SCENE.toml` prints the effects that are off, and refuses one of them with elements or bytes.
 #![allow(clippy::print_stdout, reason = "a command line example")]
 
 use cloth_sim::core::mesh::{RestShape, Topology, Vec3, generators};
@@ -50,8 +50,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return plan(steps);
     }
     let steps: usize = steps.parse()?;
-    if what == "minimal" {
-        return minimal(steps, rest.first().ok_or("expected the vertices of a side")?.parse()?);
+    if what == "minimal" || what == "linear" {
+        return minimal(
+            what == "minimal",
+            steps,
+            rest.first().ok_or("expected the vertices of a side")?.parse()?,
+        );
     }
     let scene = Scene::parse_toml(&std::fs::read_to_string(what)?, what)?;
     let options = SimulationOptions { threads: Some(1), ..SimulationOptions::default() };
@@ -77,7 +81,7 @@ fn plan(path: &str) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn minimal(steps: usize, n: usize) -> Result<(), Box<dyn std::error::Error>> {
+fn minimal(mends: bool, steps: usize, n: usize) -> Result<(), Box<dyn std::error::Error>> {
     let mesh = generators::grid(1.0, 1.0, n, n)?;
     let topology = Topology::new(mesh.vertices.len(), &mesh.triangles);
     let rest = RestShape::from_positions(&mesh, Vec3::x())?;
@@ -98,6 +102,7 @@ fn minimal(steps: usize, n: usize) -> Result<(), Box<dyn std::error::Error>> {
     let system = ClothSystem::new(&[part], &environment, mesh.vertices.len())?;
     let pool = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build()?);
     let mut integrator = Integrator::new(system, IntegratorParams::default(), pool)?;
+    integrator.mend_overshoots(mends);
     let (mut x, mut v) = (mesh.vertices.clone(), vec![Vec3::zeros(); mesh.vertices.len()]);
     let held = [0, n as u32 - 1];
     let targets = held.map(|i| x[i as usize]);

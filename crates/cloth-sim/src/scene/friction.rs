@@ -133,7 +133,10 @@ impl Scene {
         if a.min(b) >= self.cloth.len() {
             return NONE;
         }
-        self.friction_entry(contact, a, b).1.law().unwrap_or(NONE)
+        let law = self.friction_entry(contact, a, b).1.law().unwrap_or(NONE);
+        // A law that never holds is none: it would only call for the kernel that knows all laws.
+        let drags = matches!(law, FrictionLaw::Viscous { f_v, .. } if f_v > 0.0);
+        if law.static_coefficient() > 0.0 || drags { law } else { NONE }
     }
 
     /// Refuses friction that is no law, and pairs that are none.
@@ -298,6 +301,27 @@ shape = { type = "plane", half_size = 1.0 }
         }
         assert_eq!(scene.friction_law(contact, b, wall).static_coefficient(), 0.4);
         assert_eq!(scene.friction_law(contact, wall, floor).static_coefficient(), 0.0);
+    }
+
+    /// Else the response would run the kernel that knows all laws, for nothing.
+    #[test]
+    fn a_law_that_never_holds_is_none() {
+        let law = |table: &str| {
+            let text = SCENE.replacen("friction = 0.31", &format!("friction = {{ {table} }}"), 1);
+            let scene = Scene::parse_toml(&text, "test.toml").unwrap();
+            scene.friction_law(scene.contact.as_ref().unwrap(), 2, 4)
+        };
+        let stribeck = "law = \"stribeck\", v_s = 0.1, delta_s = 1.0";
+        let viscous = "law = \"viscous\", v_s = 0.1, delta_s = 1.0, delta_v = 1.0";
+        for table in [
+            "law = \"coulomb-stiction\", mu_c = 0.0, mu_s = 0.0".to_owned(),
+            format!("{stribeck}, mu_c = 0.0, mu_s = 0.0"),
+            format!("{viscous}, mu_c = 0.0, mu_s = 0.0, f_v = 0.0"),
+        ] {
+            assert_eq!(law(&table), FrictionLaw::Coulomb { mu_c: 0.0 }, "{table}");
+        }
+        assert_eq!(law(&format!("{stribeck}, mu_c = 0.0, mu_s = 0.1")).name(), "stribeck");
+        assert_eq!(law(&format!("{viscous}, mu_c = 0.0, mu_s = 0.0, f_v = 1.0")).name(), "viscous");
     }
 
     #[test]
