@@ -11,6 +11,7 @@ __all__ = ["NAMES", "TARGETS"]
 
 NAMES = (
     "scenes",
+    "sweeps",
     "meshes",
     "animations",
     "recordings",

@@ -40,7 +40,7 @@ def target() -> Target:
             texts,
             tables.map(lambda tree: File(".toml", toml(tree).encode("utf-8", "surrogatepass"))),
             tables.map(lambda tree: File(".json", json.dumps(tree).encode("utf-8", "surrogatepass"))),
-            _DEEP.map(lambda text: File(".toml", text.encode())),
+            DEEP.map(lambda text: File(".toml", text.encode())),
             _DEEP_JSON.map(lambda text: File(".json", text.encode())),
         ),
         check, lambda case: (case.suffix, case.content), File, plant, quick=300, seconds=5.0,
@@ -71,7 +71,7 @@ def check(case: File) -> None:
 
 
 # Structure that goes on and on.
-_DEEP = st.builds(
+DEEP = st.builds(
     lambda head, piece, count, tail: head + piece * count + tail,
     st.sampled_from(["", "a = ", "cloth = ", "[", "[[", "gravity = ", "[time]\ndt = "]),
     st.sampled_from(["[", "{a=", "a.", "[[a]]\n", "[a.", "a.b.", '"', "'''", "\\", "-", "1", "_", "[cloth.", "{"]),

@@ -1,4 +1,4 @@
-"""What somebody may have meant who wrote a name that is not known."""
+"""What a message says of what came: the nearest of what is known, and no more of it than can be read."""
 
 from __future__ import annotations
 
@@ -8,12 +8,20 @@ from typing import Any
 
 from clothsim.errors import InvalidInput
 
-__all__ = ["hint", "one_of"]
+__all__ = ["brief", "hint", "one_of"]
+
+_MOST = 1000  # characters of a message
+_MOST_COMPARED = 100  # characters of a name that is looked for: the search takes their square
+
+
+def brief(text: str, most: int = _MOST) -> str:
+    """Cut the middle out of a text that nobody would read to its end."""
+    return text if len(text) <= most else f"{text[: most // 2]} … {text[-(most // 2) :]}"
 
 
 def hint(name: object, known: Iterable[str], cutoff: float = 0.5) -> str:
     """``' (did you mean "x"?)'`` with the nearest of what is known; empty if none is as near as ``cutoff`` (0 to 1)."""
-    near = difflib.get_close_matches(str(name), list(known), n=1, cutoff=cutoff)
+    near = difflib.get_close_matches(str(name)[:_MOST_COMPARED], list(known), n=1, cutoff=cutoff)
     return f' (did you mean "{near[0]}"?)' if near else ""
 
 

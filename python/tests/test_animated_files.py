@@ -412,6 +412,28 @@ def test_usd_in_its_own_unit_axis_and_rate(tmp_path: Path) -> None:
         cs.Animation.load(tmp_path / "none.usdc")
 
 
+def test_usd_without_a_range_of_time_takes_that_of_what_moves(tmp_path: Path) -> None:
+    pytest.importorskip("pxr", reason="the extra 'usd' is not installed")
+    from pxr import Gf, Usd, UsdGeom
+
+    path = tmp_path / "sliding.usda"
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Y")
+    stage.SetTimeCodesPerSecond(24)
+    move = UsdGeom.Xform.Define(stage, "/World").AddTranslateOp()
+    move.Set(Gf.Vec3d(0, 0, 0), 3)
+    move.Set(Gf.Vec3d(6, 0, 0), 9)
+    mesh = UsdGeom.Mesh.Define(stage, "/World/triangle")
+    mesh.CreateFaceVertexCountsAttr([3])
+    mesh.CreateFaceVertexIndicesAttr([0, 1, 2])
+    mesh.CreatePointsAttr([(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    stage.Save()
+    animation = cs.Animation.load(path)
+    assert animation.positions[:, 0, 0].tolist() == pytest.approx([0, 1, 2, 3, 4, 5, 6], abs=1e-6)
+
+
+
 def test_usd_skeletons_are_baked(tmp_path: Path) -> None:
     pytest.importorskip("pxr", reason="the extra 'usd' is not installed")
     from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt

@@ -16,8 +16,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 pytest.importorskip("hypothesis")
 TARGETS = (
-    "scenes", "meshes", "animations", "recordings", "checkpoints", "detection", "sessions", "runs", "arrays",
-    "commands",
+    "scenes", "sweeps", "meshes", "animations", "recordings", "checkpoints", "detection", "sessions", "runs",
+    "arrays", "commands",
 )  # fmt: skip
 # Cases within which each planted fault is found; those of random scenes and of detection are the slowest.
 ENOUGH = 3000

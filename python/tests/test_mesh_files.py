@@ -90,6 +90,12 @@ def test_obj_of_other_programs(tmp_path: Path) -> None:
     assert cs.Mesh.load(tmp_path / "b.obj") == mesh
 
 
+def test_obj_that_starts_with_a_byte_order_mark(tmp_path: Path) -> None:
+    text = "v 1 2 3\nv 2 2 3\nv 1 3 3\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text(text, encoding="utf-8-sig")
+    assert cs.Mesh.load(tmp_path / "a.obj").vertices.tolist() == [[1, 2, 3], [2, 2, 3], [1, 3, 3]]
+
+
 def ply(fmt: str, faces: list[list[int]]) -> bytes:
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.5], [2.0, 1.0, 0.25]]
     header = (

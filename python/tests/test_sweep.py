@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import signal
 import subprocess
@@ -15,8 +16,9 @@ from conftest import RunCli, cli_command
 
 import clothsim as cs
 from clothsim._cli import main
-from clothsim.sweep import cluster, task
+from clothsim.sweep import cluster, farm, task
 from clothsim.sweep.draws import draw
+from clothsim.sweep.file import read as read_sweep
 
 pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
 pq = pytest.importorskip("pyarrow.parquet", reason="the extra 'sweep' is not installed")
@@ -226,6 +228,100 @@ def test_a_scheduler_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.Mo
         with pytest.raises(cs.ClusterError, match=f"scheduler {address}: no answer within 0.3 s"):
             cs.sweep.run_file(path, scheduler=address, out=tmp_path / "out", progress=False)
         assert not (tmp_path / "out").exists()
+
+
+def test_a_scheduler_that_goes_in_mid_run(tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One clear error; what has finished is kept; another cluster does the rest, to the same tables."""
+    from distributed.comm import CommClosedError
+
+    path = write(tmp_path, SWEEP.replace('keep = ["npz"]\n', "") + SMALL)
+    here = cs.sweep.run_file(path, scheduler=scheduler, progress=False)
+    levels = [logging.getLogger(name).level for name in cluster._CHATTER]
+    finished: list[Path] = []
+
+    def gone(self: cluster.RemoteCluster) -> int:
+        finished[:] = (tmp_path / "out" / ".clothsim" / "results").glob("*.json")
+        if finished:
+            raise CommClosedError("in <TCP (closed)>: Connection reset by peer")
+        return 1
+
+    with monkeypatch.context() as patched:
+        patched.setattr(cluster.RemoteCluster, "slots", property(gone))
+        with pytest.raises(cs.ClusterError, match="the scheduler is gone; what has finished is kept, and --resume"):
+            cs.sweep.run_file(path, scheduler=scheduler, out=tmp_path / "out", progress=False)
+    assert 0 < len(finished) < len(here.rows())
+    assert [logging.getLogger(name).level for name in cluster._CHATTER] == levels
+    there = cs.sweep.run_file(path, scheduler=scheduler, out=tmp_path / "out", resume=True, progress=False)
+    assert there.runs.equals(here.runs)
+    assert there.frames.equals(here.frames)
+
+
+@pytest.mark.parametrize("status", ["lost", "pending", "finished"])
+def test_a_result_that_is_lost_with_its_worker_is_waited_for(tmp_path: Path, status: str) -> None:
+    """A worker that ends just after a run: the run is neither failed nor done until there is a result."""
+
+    class Future:
+        key, released = "", False
+
+        def exception(self) -> None:
+            return None
+
+        def result(self, timeout: float) -> None:
+            raise TimeoutError
+
+        def add_done_callback(self, told: Any) -> None:
+            self.told = told
+
+        def release(self) -> None:
+            self.released = True
+
+    class Client:
+        def submit(self, _: Any, *__: Any, key: str, **___: Any) -> Any:
+            future.key = key
+            return future
+
+    class Workers:
+        client, slots = Client(), 1
+
+        def look_after(self) -> None:
+            """Nobody is missing."""
+
+    future: Any = Future()
+    request = read_sweep(write(tmp_path, "[vary]\nfabric = ['cotton']\n" + SMALL)).request
+    work, found = task.Work(str(tmp_path), "token"), []
+    one = farm._Farm(Workers(), request, work, 1, lambda *told: found.append(told), print)  # type: ignore[arg-type]
+    one._submit(request.runs[0])
+    future.status = status
+    one._take(future)
+    assert (found, future.released) == ([], False)
+    assert list(one._open) == [future.key]
+    result = work.result(request.runs[0].name)
+    result.parent.mkdir()
+    result.write_text('{"seconds": 1.0}')
+    one._take(future)
+    assert [facts["seconds"] for _, facts in found] == [1.0]
+    assert future.released
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("name = 3\n[seeds]\ncount = 2\n", "name: expected a text, got 3"),
+        ("vary = " + "[" * 3000, "cannot read the sweep: nested too deep"),
+        ("[vary]\n" + "a." * 200 + "a = 1\n", "cannot read the sweep: nested more than 60 deep"),
+        ("# " + "x" * 5 * 2**20, "cannot read the sweep: more than 4 MiB"),
+        ("y" * 100_000 + " = 1\n", "expected one of the keys"),
+        ("scene = 'none.toml'\n", "none.toml: cannot read the scene"),
+    ],
+)
+def test_files_that_are_no_sweeps(tmp_path: Path, text: str, error: str) -> None:
+    path = tmp_path / "sweep.toml"
+    path.write_text(text + SMALL if text.startswith("name") else text)
+    with pytest.raises((cs.InvalidInput, cs.InvalidScene)) as caught:
+        cs.sweep.run_file(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert error in str(caught.value)
+    assert len(str(caught.value)) < 1100
 
 
 # Runs that fail -------------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from view_runs import falling, small_run
 
 import clothsim as cs
 from clothsim import _cli
+from clothsim._export.plots import costliest
 from clothsim._view.fields import Fields
 from clothsim._view.pictures import _ffmpeg, film_frames, write_film, write_still
 from clothsim._view.source import Source
@@ -190,6 +191,28 @@ def test_plots_are_pictures_of_the_report(run: Path, tmp_path: Path) -> None:
     (tmp_path / "only").mkdir()
     (tmp_path / "only" / "report.json").write_text(json.dumps(report))
     assert cli(tmp_path / "only", "--plots", tmp_path / "c.png", "--quiet") == 0, "plots need no frames"
+
+
+def test_frames_tell_what_each_effect_cost(run: Path) -> None:
+    """Over the frames of a run they are what its report says of the whole."""
+    report = json.loads((run / "report.json").read_bytes())
+    frames = [frame["effects"] for frame in report["frames"]]
+    assert not any(frames[0].values()), "the start has no steps"
+    assert min(value for frame in frames for value in frame.values()) >= 0.0
+    whole = {row["name"]: row["milliseconds"] for row in report["effects"] if row["milliseconds"] is not None}
+    assert whole.keys() == frames[-1].keys()
+    for name, total in whole.items():
+        assert sum(frame.get(name, 0.0) for frame in frames) == pytest.approx(total, rel=1e-9, abs=1e-9), name
+
+
+def test_the_dearest_effects_have_a_curve_of_their_own() -> None:
+    names = [f"effect {k}" for k in range(11)]
+    frames = [{"effects": {name: float(k) for k, name in enumerate(names)}} for _ in range(3)]
+    found = costliest([{"effects": dict.fromkeys(names, 0.0)}, *frames])
+    assert list(found) == [*names[:2:-1], "2 others"], "the one that costs nothing has none"
+    assert found["2 others"] == [0.0, 3.0, 3.0, 3.0]
+    assert found["effect 10"] == [0.0, 10.0, 10.0, 10.0]
+    assert costliest([{"seconds": {}}]) == {}, "runs of an earlier version say nothing of it"
 
 
 def test_the_window_plays_steps_and_colours(tmp_path: Path) -> None:

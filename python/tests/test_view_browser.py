@@ -88,6 +88,9 @@ def test_the_page_holds_the_frames_to_its_precision(run: Path) -> None:
     total = header["plots"][0]["series"][0]["values"]
     facts: list[Any] = facts_of(run)
     assert total[-1] == pytest.approx(facts[-1]["energy"]["total"] - facts[0]["energy"]["total"], rel=1e-4)
+    costs = next(plot for plot in header["plots"] if plot["title"] == "Cost of each effect")
+    contact = next(series for series in costs["series"] if series["label"] == "contact")
+    assert contact["values"] == pytest.approx([f["effects"].get("contact", 0.0) for f in facts], rel=1e-4)
 
 
 def test_the_page_needs_nothing_else(run: Path, tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
 """Install the wheel into clean environments and use it there; build another wheel from the source distribution.
 
 For each Python 3.10 to 3.13 that the machine has: the package alone (commands, a shrunken demo, the message of each
-missing extra, a typed user's script under mypy), then with all extras the first page's commands and part of the tests.
-On the oldest one also with the oldest packages that the metadata allows. Nothing of the checkout is on a path.
+missing extra, a typed user's script under mypy), then with all extras what each is for, the pages that people read
+first, and part of the tests; on the newest one more of them. On the oldest one also with the oldest packages that the
+metadata allows. Nothing of the checkout is on a path.
 
 Run: python tools/wheel/check_installed.py DIST [--python 3.10 ...] [--quick]       (by `make wheel-test`)
 """
@@ -19,16 +20,28 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
+
+import pages
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 VERSIONS = ("3.10", "3.11", "3.12", "3.13")
-EXTRAS = ("usd", "view", "plot", "robot")
+EXTRAS = ("usd", "view", "plot", "robot", "sweep")
+# What package indices show, and what the documentation begins with.
+PAGES = ("python/README.md", "docs/get-started.md")
 # Tests that need neither Rust, nor the repository's folders, nor pictures.
 SUITE = (
     "test_bending", "test_collision", "test_effects", "test_friction", "test_mesh", "test_recording",
     "test_restart", "test_scene", "test_session", "test_simulation", "test_steer",
 )  # fmt: skip
+# Those of the extras and of the command line, and what they need beyond the extras.
+WIDER = (
+    "test_animations", "test_cli", "test_export", "test_garments", "test_mesh_files", "test_moving_meshes",
+    "test_robot", "test_sweep", "test_view", "test_view_fields",
+)  # fmt: skip
+HELPERS = ("conftest", "comparison", "disks", "study_scenes", "view_runs")
+TEST_PACKAGES = ("pytest", "pytest-timeout", "trimesh", "pygltflib")
 TYPED = """
 import clothsim as cs
 
@@ -87,20 +100,9 @@ def probe(python: str, folder: Path, stage: str, *extras: str) -> None:
     run([python, "-I", "probe.py", stage, *extras], work)
 
 
-def first_page(python: str, folder: Path) -> int:
-    """Run the page that package indices show, of each run two frames; how many blocks there are."""
-    work = folder / "first-page"
-    work.mkdir()
-    blocks = re.findall(r"```(sh|python)\n(.*?)```", (ROOT / "python" / "README.md").read_text(), re.DOTALL)
-    for kind, text in blocks:
-        if kind == "python":
-            run([python, "-I", "-c", text.replace("duration=0.5", "duration=0.1")], work)
-            continue
-        for line in text.splitlines():
-            words = line.split("#")[0].replace("clothsim run ", "clothsim run --frames 2 ").strip()
-            if not words.startswith("pip "):  # what it installs is installed
-                run(["bash", "-ec", words], work, PATH=f"{Path(python).parent}:{os.environ['PATH']}")
-    return len(blocks)
+def first_pages(python: str, folder: Path) -> int:
+    """Do what the first pages say, of each run two frames; how many blocks they have."""
+    return sum(pages.follow(ROOT / name, folder / Path(name).stem, python, run, frames=2) for name in PAGES)
 
 
 def typed(python: str, folder: Path) -> None:
@@ -113,18 +115,27 @@ def typed(python: str, folder: Path) -> None:
             raise SystemExit(f"check_installed: mypy on {name}.py: exit code {done.returncode}\n{done.stdout}")
 
 
-def suite(python: str, folder: Path) -> str:
-    """Run part of the tests from a copy of them; their last line."""
+def suite(python: str, folder: Path, names: Sequence[str]) -> str:
+    """Run these tests from a copy of them; their last line."""
     tests = folder / "copy" / "python" / "tests"
     tests.mkdir(parents=True)
-    for name in [*SUITE, "conftest", "comparison"]:
+    for name in [*names, *HELPERS]:
         shutil.copy(ROOT / "python" / "tests" / f"{name}.py", tests)
-    shutil.copytree(ROOT / "examples", folder / "copy" / "examples")
-    run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "pytest", "pytest-timeout"], folder)
+    for name in ("examples", "docs", "README.md", "REFERENCES.bib"):  # what tests read beside the package
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, folder / "copy" / name)
+    run([python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *TEST_PACKAGES], folder)
     marks = ["-m", "not slow and not data", "-p", "no:cacheprovider", "-q", "--timeout", "300"]
     config = folder / "copy" / "pytest.ini"
-    config.write_text("[pytest]\nmarkers =\n    slow: slow\n    data: data\nfilterwarnings = error\n")
+    warnings = "\n    ".join(_table("pyproject.toml")["tool"]["pytest"]["ini_options"]["filterwarnings"])
+    config.write_text(f"[pytest]\nmarkers =\n    slow: slow\n    data: data\nfilterwarnings =\n    {warnings}\n")
     return run([python, "-m", "pytest", "-c", str(config), *marks, str(tests)], folder).strip().splitlines()[-1]
+
+
+def _table(name: str) -> dict[str, Any]:
+    import tomllib
+
+    return tomllib.loads((ROOT / name).read_text())
 
 
 def oldest(wheel: Path) -> list[str]:
@@ -159,6 +170,9 @@ def main() -> None:
     options = parser.parse_args()
     [wheel], [sdist] = options.dist.resolve().glob("*.whl"), options.dist.resolve().glob("*.tar.gz")
     found = list(pythons(options.python or VERSIONS))
+    newest = next((version for version, python in reversed(found) if python is not None), None)
+    if newest is None:
+        raise SystemExit(f"check_installed: none of Python {', '.join(v for v, _ in found)} is on this machine")
     for version, python in found:
         if python is None:
             print(f"Python {version}: not on this machine, skipped", flush=True)
@@ -172,18 +186,21 @@ def main() -> None:
             typed(bare, folder)
             done = "alone"
             if not options.quick:
+                names = [*SUITE, *(WIDER if version == newest else ())]
                 run([bare, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", f"{wheel}[all]"], folder)
                 probe(bare, folder, "present", *EXTRAS)
-                done += f", all extras, first page ({first_page(bare, folder)} blocks), tests: {suite(bare, folder)}"
+                done += f", all extras, first pages ({first_pages(bare, folder)} blocks)"
+                done += f", tests: {suite(bare, folder, names)}"
             if version == VERSIONS[0]:
                 probe(environment(python, folder / "oldest", str(wheel), *oldest(wheel)), folder, "core")
                 done += f"; oldest packages: {' '.join(oldest(wheel))}"
         print(f"Python {version}: {done} ({time.perf_counter() - began:.0f} s)", flush=True)
     if not options.quick:
         began = time.perf_counter()
-        newest = [python for _, python in found if python is not None][-1]
+        python = dict(found)[newest]
+        assert python is not None
         with tempfile.TemporaryDirectory() as name:
-            from_sdist(newest, sdist, Path(name))
+            from_sdist(python, sdist, Path(name))
         print(f"source distribution: builds a wheel that works ({time.perf_counter() - began:.0f} s)")
 
 

@@ -71,11 +71,34 @@ def gymnasium() -> None:
         raise cs.MissingDependency("clothsim[robot]") from error
 
 
+def sweep() -> None:
+    """Two runs on processes of this machine, and their table."""
+    scene = cs.Scene(duration=0.02, time={"dt": 0.005})
+    scene.add_cloth(cs.Mesh.grid(0.4, 0.4, 5, 5), "silk", pins=[{"vertices": [0, 4]}])
+    found = cs.sweep.run(scene, {"fabric": ["cotton", "silk"]}, metrics=["lowest"], out="sweep", progress=False)
+    assert [row["status"] for row in found.rows()] == ["ok", "ok"], found.rows()
+    parquet = importlib.import_module("pyarrow.parquet")
+    assert parquet.read_table("sweep/runs.parquet")["fabric"].to_pylist() == ["cotton", "silk"]
+
+
+def looks() -> None:
+    """Run, and look at it: a still, coloured; a page for browsers; plots; without a display."""
+    command("example", "hanging", "-o", "looks.toml")
+    command("run", "looks.toml", "-o", "looks", "--frames", "2", "--quiet")
+    command("view", "looks", "--still", "strain.png", "--color", "strain", "--size", "160x120", "--quiet")
+    command("view", "looks", "--browser", "--quiet")
+    command("view", "looks", "--plots", "plots.svg", "--quiet")
+    for name, least in (("strain.png", 1000), ("looks/view.html", 50_000), ("plots.svg", 5000)):
+        assert Path(name).stat().st_size > least, name
+    assert "</html>" in Path("looks/view.html").read_text()[-20:], "the page's parts come with the wheel"
+
+
 USES: dict[str, Callable[[], object]] = {
     "usd": lambda: frames().save_usd("scene.usdc"),
     "view": lambda: frames().film_strip("strip.png", moments=2),
     "plot": plots,
     "robot": gymnasium,
+    "sweep": sweep,
 }
 
 
@@ -127,6 +150,7 @@ def present(extras: list[str]) -> None:
     """With these extras: what they are for works."""
     for extra in extras:
         USES[extra]()
+    looks()
 
 
 if __name__ == "__main__":

@@ -3,8 +3,9 @@
 use pyo3::prelude::*;
 
 /// Name and text of each scene in `examples/` that needs no other file.
-const SCENES: [(&str, &str); 10] = [
+const SCENES: [(&str, &str); 11] = [
     ("cantilever", include_str!("../../../examples/cantilever.toml")),
+    ("card", include_str!("../../../examples/card.toml")),
     ("crease", include_str!("../../../examples/crease.toml")),
     ("drape", include_str!("../../../examples/drape.toml")),
     ("flag", include_str!("../../../examples/flag.toml")),

@@ -11,7 +11,7 @@ import numpy as np
 from clothsim._arrays import optional
 from clothsim._files import write_whole
 
-__all__ = ["write"]
+__all__ = ["costliest", "write"]
 
 _INK, _GRID = "#343230", "#e4e1db"
 _ENERGIES = {
@@ -21,9 +21,11 @@ _ENERGIES = {
 _WORKS = {"pins": "#8d8a84", "air": "#5aa0a8"}
 _STAGES = ("#2f5d8c", "#9c2f35", "#c08a2e", "#3f7a57", "#7a5195", "#8d8a84", "#5aa0a8", "#c46f9b", "#a8a03c")
 
+_MOST_EFFECTS = 8  # curves that are told apart
+
 
 def write(frames: list[dict[str, Any]], path: Path, title: str, *, effects: list[dict[str, Any]] | None = None) -> None:
-    """Draw energy by kind over time, wall-clock time per stage, and contacts per frame, into a PNG, SVG or PDF.
+    """Draw energy by kind over time, wall-clock time per stage and per effect, and contacts, into a PNG, SVG or PDF.
 
     With ``effects``, the table of a report, also what each effect cost in the whole run.
     """
@@ -32,17 +34,17 @@ def write(frames: list[dict[str, Any]], path: Path, title: str, *, effects: list
     times = np.array([frame["time"] for frame in frames])
     has_contact = any(frame["contact"] for frame in frames)
     costs = sorted((e["milliseconds"], e["name"]) for e in effects or [] if e["milliseconds"])
-    over_time = 3 if has_contact else 2
+    priced = costliest(frames)
+    drawn = [_energies, _timings, *([_effects] if priced else []), *([_contacts] if has_contact else [])]
+    over_time = len(drawn)
     heights = [3.5] * over_time + [0.9 + 0.26 * len(costs)] * bool(costs)
     figure = figures.Figure(figsize=(10, sum(heights)), dpi=150, layout="constrained")
     grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
     axes = [figure.add_subplot(grid[0])]
     axes += [figure.add_subplot(grid[row], sharex=axes[0]) for row in range(1, over_time)]
     figure.suptitle(title or "clothsim", fontsize=15, color=_INK, x=0.01, ha="left")
-    _energies(axes[0], times, frames)
-    _timings(axes[1], times, frames)
-    if has_contact:
-        _contacts(axes[2], times, frames)
+    for draw, axis in zip(drawn, axes, strict=True):
+        draw(axis, times, frames)
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     axes[-1].set_xlabel("simulated time [s]", color=_INK)
@@ -105,6 +107,28 @@ def _timings(axis: Any, times: Any, frames: list[dict[str, Any]]) -> None:
     colours = [_STAGES[k % len(_STAGES)] for k in range(len(stages))]
     axis.stackplot(times[1:], rows, labels=stages, colors=colours, linewidth=0)
     axis.set_ylabel("time per frame [ms]", color=_INK)
+
+
+def costliest(frames: list[dict[str, Any]]) -> dict[str, list[float]]:
+    """What each effect cost between each frame and the one before [ms], the dearest first; the cheap ones together.
+
+    Empty where frames do not say so. The frame at which a run began has no steps: its cost is zero.
+    """
+    names = dict.fromkeys(name for frame in frames for name in frame.get("effects", {}))
+    rows = {name: [frame.get("effects", {}).get(name, 0.0) for frame in frames] for name in names}
+    ranked = sorted((name for name in rows if any(rows[name])), key=lambda name: -sum(rows[name]))
+    found = {name: rows[name] for name in ranked[:_MOST_EFFECTS]}
+    if rest := ranked[_MOST_EFFECTS:]:
+        found[f"{len(rest)} others"] = [sum(values) for values in zip(*(rows[name] for name in rest), strict=True)]
+    return found
+
+
+def _effects(axis: Any, times: Any, frames: list[dict[str, Any]]) -> None:
+    priced = costliest(frames)
+    colours = [_STAGES[k % len(_STAGES)] for k in range(len(priced))]
+    rows = [values[1:] for values in priced.values()]
+    axis.stackplot(times[1:], rows, labels=list(priced), colors=colours, linewidth=0)
+    axis.set_ylabel("cost of each effect\nper frame [ms]", color=_INK)
 
 
 def _contacts(axis: Any, times: Any, frames: list[dict[str, Any]]) -> None:

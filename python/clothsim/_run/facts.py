@@ -18,6 +18,7 @@ class FrameFacts:
         self._simulation = simulation
         self._steps = int(header["steps"])
         self._wall = float(header["wall_seconds"])
+        self._effects: dict[str, float] = header.get("effects") or _effects(simulation)
         self._started = time.monotonic()
 
     @property
@@ -31,12 +32,16 @@ class FrameFacts:
 
     def header(self, frames: int, digest: str) -> dict[str, Any]:
         """Header of a checkpoint that ``frames`` frames belong to."""
-        return {"frames": frames, "steps": self._steps, "wall_seconds": self.wall_seconds(), "digest": digest}
+        return {
+            "frames": frames, "steps": self._steps, "wall_seconds": self.wall_seconds(), "digest": digest,
+            "effects": self._effects,
+        }  # fmt: skip
 
     def next(self, frame: int) -> dict[str, Any]:
         """Facts about the state now, and about the steps since the frame before."""
         steps = json.loads(self._simulation._core.steps(self._steps))
         self._steps += len(steps)
+        before, self._effects = self._effects, _effects(self._simulation)
         return {
             "frame": frame,
             "time": self._simulation.time,
@@ -51,7 +56,14 @@ class FrameFacts:
             "contact": _contact(steps),
             "intersections": steps[-1]["intersections"] if steps else None,
             "seconds": _seconds(steps),
+            "effects": {name: total - before.get(name, 0.0) for name, total in self._effects.items()},
         }
+
+
+def _effects(simulation: Simulation) -> dict[str, float]:
+    """What each effect that has a time of its own has cost so far [ms]."""
+    rows = json.loads(simulation._core.summary())["effects"]
+    return {row["name"]: row["milliseconds"] for row in rows if row["milliseconds"] is not None}
 
 
 def _work(steps: list[dict[str, Any]]) -> dict[str, float] | None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from clothsim._arrays import Floats
+from clothsim._export.plots import costliest
 from clothsim._export.studio import body_colours, is_backdrop, subject
 from clothsim._files import write_whole
 from clothsim._progress import progress_bar
@@ -26,7 +27,10 @@ from clothsim.recording import Recording
 
 __all__ = ["Page", "thinned", "write"]
 
-_SCRIPTS = ("data.js", "camera.js", "shaders.js", "renderer.js", "plots.js", "interface.js")
+_SCRIPTS = (
+    "data.js", "camera.js", "shaders.js", "renderer.js", "plots.js", "dom.js", "themes.js", "playback.js", "panel.js",
+    "pointer.js", "controls.js", "interface.js",
+)  # fmt: skip
 
 # Bytes of a vertex in a frame before compression: a position, and strain, contact and speed. About a third is left of
 # them, and base64 makes four bytes of three.
@@ -37,6 +41,7 @@ _ENERGIES = {
     "bending": "#8a5fae",
 }  # fmt: skip
 _CONTACTS = {"proximities": ("within the thickness", "#3f78b5"), "collisions": ("colliding", "#c0453f")}
+_EFFECTS = ("#3f78b5", "#c0453f", "#c98a22", "#3f8f62", "#8a5fae", "#8d8a84", "#4f9aa3", "#b9618c", "#98922f")
 
 
 @dataclass(frozen=True)
@@ -240,6 +245,9 @@ def _plots(facts: list[dict[str, Any]]) -> list[dict[str, Any]]:
     seconds = np.array([sum(fact["seconds"].values()) for fact in facts])
     costs = [_series("wall clock", "#8a5fae", 1e3 * seconds)] if np.any(seconds) else []
     plots.append({"title": "Time per frame", "unit": "ms", "series": costs})
+    priced = zip(costliest(facts).items(), _EFFECTS, strict=False)
+    effects = [_series(name, colour, np.array(values)) for (name, values), colour in priced]
+    plots.append({"title": "Cost of each effect", "unit": "ms per frame", "series": effects})
     return [plot for plot in plots if plot["series"]]
 
 

@@ -72,8 +72,7 @@ def _seen(
         spec = {"case": cell.case.name, "x": cell.x, "y": cell.y, "fixed": request.fixed}
         name = fingerprint([spec, limit, engine_digest()])
         jobs.append(Job(folder.work / name, {**spec, "threads": 1}, "clothsim.stability.worker"))
-    bar = progress_bar(len(jobs), enabled=progress, name="cells")
-    bar.unit = "cell"
+    bar = progress_bar(len(jobs), enabled=progress, name="cells", unit="cell")
     try:
         run_jobs(jobs, processes, limit, bar.update)
     finally:

@@ -6,6 +6,7 @@ import copy
 import itertools
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -149,7 +150,7 @@ def axis(name: str, values: Any, *, most: int = _MOST_VALUES, once: bool = True)
     texts = [value_text(v) for v in found]
     if wild := [t for t, v in zip(texts, found, strict=True) if isinstance(v, float) and not math.isfinite(v)]:
         raise InvalidInput(f"axis {name}: expected finite numbers, got {', '.join(wild)}", name=name, got=wild[0])
-    twice = sorted({t for t in texts if texts.count(t) > 1})
+    twice = sorted(text for text, times in Counter(texts).items() if times > 1)
     if once and twice:
         raise InvalidInput(f"axis {name}: expected each value once, got {', '.join(twice)} twice", name=name)
     return Axis(name, key, found)

@@ -161,8 +161,7 @@ def _measured(
         limit=limit,
     )  # fmt: skip
     where = machine.facts()
-    bar = progress_bar(len(request.points) * runner.per_point, enabled=progress, name="runs")
-    bar.unit = "run"
+    bar = progress_bar(len(request.points) * runner.per_point, enabled=progress, name="runs", unit="run")
     try:
         runs = runner.run(request.points, bar.update)
         references = _references(request, runner, runs, bar)

@@ -17,7 +17,7 @@ from clothsim._nearest import one_of
 from clothsim.errors import ClothSimError, InvalidInput
 from clothsim.study.axes import Axis, apply, value_text
 
-__all__ = ["Settings", "build", "check_contact", "check_each", "check_values", "label", "product"]
+__all__ = ["Built", "Settings", "build", "check_contact", "check_each", "check_values", "label", "product"]
 
 # Name of an axis and its value, for every axis.
 Settings = dict[str, Any]

@@ -128,8 +128,7 @@ def tune(
             scene, request.base, request.axes, folder, repeats=repeats, patience=patience, processes=processes,
             limit=limit,
         )  # fmt: skip
-        bar = progress_bar(0, enabled=progress, name="runs")
-        bar.unit = "run"
+        bar = progress_bar(0, enabled=progress, name="runs", unit="run")
         try:
             search = Search(request, runner, goal, bar.update)
             look(search)

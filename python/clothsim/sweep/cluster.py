@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import shutil
 import subprocess
@@ -22,6 +23,7 @@ __all__ = ["Cluster", "LocalCluster", "RemoteCluster", "check_packages", "connec
 _GRACE = 6.0  # s that workers have to write a checkpoint
 _STARTS = 5  # workers that may end one after another before one of them has reached the scheduler
 _ANSWER = 10.0  # s that a scheduler has to answer
+_CHATTER = ("distributed.client", "distributed.core", "distributed.comm", "distributed.utils", "tornado.application")
 _FIRST = 60.0  # s until it has a worker
 
 
@@ -63,9 +65,14 @@ class RemoteCluster(Cluster):
     def __init__(self, address: str) -> None:
         from distributed import Client
 
+        # A scheduler that goes is told of once, by an error of ours, not by tracebacks of each attempt to reach it.
+        self._loggers = [(logger, logger.level) for logger in map(logging.getLogger, _CHATTER)]
+        for logger, _ in self._loggers:
+            logger.setLevel(logging.CRITICAL)
         try:
             client = Client(address, timeout=_ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
+            self._restore_logging()
             raise ClusterError(
                 f"scheduler {address}: no answer within {_ANSWER:g} s ({type(error).__name__}: {error}); expected the "
                 "address of a Dask scheduler such as tcp://host:8786"
@@ -76,6 +83,15 @@ class RemoteCluster(Cluster):
         except Exception as error:
             self.close()
             raise ClusterError(f"scheduler {address}: it has no workers after {_FIRST:g} s") from error
+
+    def close(self) -> None:
+        """Let go, and leave the logging of Dask as it was."""
+        super().close()
+        self._restore_logging()
+
+    def _restore_logging(self) -> None:
+        for logger, level in self._loggers:
+            logger.setLevel(level)
 
 
 class LocalCluster(Cluster):

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from clothsim import _core
-from clothsim.errors import ClusterError, OutputError
+from clothsim.errors import ClothSimError, ClusterError, OutputError
 from clothsim.sweep import task
 from clothsim.sweep.cluster import Cluster
 from clothsim.sweep.request import Request, Run
@@ -19,6 +19,8 @@ __all__ = ["run_all"]
 _AHEAD = 3  # runs that wait at the scheduler for each that is under way
 _TICK = 0.2  # s
 _GATHER = 5.0  # s for a result to come over
+_GO_ON = "what has finished is kept, and --resume goes on, there or elsewhere"
+_GONE = f"the scheduler is gone; {_GO_ON}"
 _ALONE = 120.0  # s without a worker after which nobody is expected to come
 
 
@@ -83,6 +85,14 @@ class _Farm:
         ]
 
     def run(self, waiting: list[Run]) -> None:
+        try:
+            self._run_all(waiting)
+        except ClothSimError:
+            raise
+        except (OSError, TimeoutError, asyncio.TimeoutError, asyncio.CancelledError) as error:
+            raise ClusterError(_GONE) from error
+
+    def _run_all(self, waiting: list[Run]) -> None:
         waiting.reverse()
         alone = 0.0
         while waiting or self._open:
@@ -95,14 +105,14 @@ class _Farm:
                 self._cluster.look_after()
                 alone = 0.0 if self._cluster.client.nthreads() else alone + _TICK
             if self._cluster.client.status != "running":
-                raise ClusterError("the scheduler is gone; --resume goes on, there or elsewhere")
+                raise ClusterError(_GONE)
             if alone > _ALONE:
-                raise ClusterError(f"the scheduler has had no workers for {_ALONE:g} s; --resume goes on")
+                raise ClusterError(f"the scheduler has had no workers for {_ALONE:g} s; {_GO_ON}")
 
     def _submit(self, run: Run) -> None:
         request = self._request
         spec = task.Spec(
-            run.name, run.data, run.seed, request.disturbance, request.threads, run.device,
+            run.name, request.data(run), run.seed, request.disturbance, request.threads, run.device,
             tuple(request.metrics), tuple(request.series), tuple(request.keep), request.timeout, _core.__version__,
         )  # fmt: skip
         key = f"clothsim-run-{run.name}-{self._losses.get(run.number, 0)}"
@@ -118,7 +128,12 @@ class _Farm:
         run, _ = self._open.pop(future.key, (None, None))
         if run is None:
             return
-        if future.status in ("finished", "pending"):
+        status = future.status
+        if status == "cancelled":
+            gone = self._cluster.client.status != "running"
+            raise ClusterError(_GONE if gone else f"the scheduler has let go of its runs; {_GO_ON}")
+        error = future.exception() if status == "error" else None
+        if error is None:  # finished; or "lost" or "pending" since: its worker ended with the result
             facts = self._facts(run, future)
             if facts is None:
                 return
@@ -127,9 +142,6 @@ class _Farm:
             self._done(run, facts)
             future.release()
             return
-        if future.status == "cancelled":
-            raise ClusterError("the scheduler has let go of its runs; --resume goes on, there or elsewhere")
-        error = future.exception()
         if isinstance(error, KilledWorker):
             self._start_again(run)
         elif isinstance(error, (OutputError, ClusterError)):

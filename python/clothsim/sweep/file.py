@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from clothsim import _core
-from clothsim._nearest import hint
+from clothsim._nearest import brief, hint
 from clothsim._toml import tomllib
-from clothsim.errors import ClothSimError, InvalidInput
+from clothsim.errors import ClothSimError, InvalidInput, InvalidScene
 from clothsim.scene import Scene
 from clothsim.study.axes import NAMED
 from clothsim.sweep.draws import KINDS
@@ -24,6 +25,8 @@ _KEYS = (
     "name", "scene", "set", "vary", "combine", "seeds", "metrics", "series", "keep", "timeout", "retries", "threads",
     "device", "checkpoint_interval",
 )  # fmt: skip
+_MOST_BYTES = 4 * 2**20  # far more than any sweep; what is no sweep is not read whole
+_MOST_LEVELS = 60
 _SEED_KEYS = ("count", "first", "disturbance", "draw")
 
 
@@ -45,14 +48,42 @@ def read(path: str | os.PathLike[str], fixed: Mapping[str, Any] | None = None) -
     """
     where = Path(path)
     try:
-        tables = tomllib.loads(where.read_bytes().decode("utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidInput(f"{where}: cannot read the sweep: {reason}", name="SWEEP") from error
-    try:
-        return _made(tables, where, dict(fixed or {}))
+        return _made(_parsed(where), where, dict(fixed or {}))
     except InvalidInput as error:
-        raise InvalidInput(f"{where}: {error}", name=error.name, expected=error.expected, got=error.got) from error
+        known = {key: getattr(error, key) for key in ("name", "expected", "got")}
+        raise InvalidInput(brief(f"{where}: {error}"), **known) from error
+    except InvalidScene as error:
+        known = {key: getattr(error, key) for key in ("file", "line", "key", "expected", "got", "nearest")}
+        raise InvalidScene(brief(f"{where}: {error}"), **known) from error
+
+
+def _parsed(where: Path) -> dict[str, Any]:
+    try:
+        with where.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+        if len(content) > _MOST_BYTES:
+            raise ValueError(f"more than {_MOST_BYTES // 2**20} MiB")
+        tables = tomllib.loads(content.decode("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        reason = "nested too deep" if isinstance(error, RecursionError) else getattr(error, "strerror", None) or error
+        raise InvalidInput(f"cannot read the sweep: {reason}", name="SWEEP") from error
+    _check_depth(tables)
+    return tables
+
+
+def _check_depth(tables: dict[str, Any]) -> None:
+    """Refuse what is nested deeper than any scene, and deeper than what follows could follow."""
+    level: list[Any] = [tables]
+    for _ in range(_MOST_LEVELS):
+        level = [
+            value
+            for node in level
+            for value in (node.values() if isinstance(node, dict) else node)
+            if isinstance(value, (dict, list))
+        ]
+        if not level:
+            return
+    raise InvalidInput(f"cannot read the sweep: nested more than {_MOST_LEVELS} deep", name="SWEEP")
 
 
 def _made(tables: dict[str, Any], where: Path, fixed: dict[str, Any]) -> SweepFile:
@@ -78,9 +109,9 @@ def _made(tables: dict[str, Any], where: Path, fixed: dict[str, Any]) -> SweepFi
 def _known(prefix: str, table: Mapping[str, Any], keys: tuple[str, ...]) -> None:
     for key in table:
         if key not in keys:
-            expected = f"one of the keys {', '.join(keys)}"
+            expected, got = f"one of the keys {', '.join(keys)}", brief(key, 80)
             raise InvalidInput(
-                f'{prefix}{key}: expected {expected}, got the unknown key "{key}"{hint(key, keys)}',
+                f'{prefix}{got}: expected {expected}, got the unknown key "{got}"{hint(key, keys)}',
                 name=prefix + key,
                 got=key,
             )
@@ -123,7 +154,7 @@ def _scenes(given: Any, where: Path) -> dict[str, Scene]:
         expected = "the path of a scene, a list of them, or a table [scene]"
         got = "nothing" if given is None else repr(given)
         raise InvalidInput(f"scene: expected {expected}, got {got}", name="scene", expected=expected, got=got)
-    if twice := sorted({p for p in paths if paths.count(p) > 1}):
+    if twice := sorted(path for path, times in Counter(paths).items() if times > 1):
         raise InvalidInput(f"scene: expected each once, got {', '.join(twice)} twice", name="scene")
     return {path if len(paths) > 1 else "": Scene.load(where.parent / path) for path in paths}
 

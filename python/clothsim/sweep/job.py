@@ -160,8 +160,7 @@ def _results(
             known[one.number] = found
         else:
             waiting.append(one)
-    bar = progress_bar(len(request.runs), initial=len(known), enabled=options.progress, name=request.name)
-    bar.unit = "run"
+    bar = progress_bar(len(request.runs), initial=len(known), enabled=options.progress, name=request.name, unit="run")
     again = 0
 
     def done(one: Run, facts: Mapping[str, Any]) -> None:

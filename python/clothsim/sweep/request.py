@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from clothsim.study.axes import RUN_AXES, Axis, axis
 from clothsim.study.folder import fingerprint
 from clothsim.study.job import based
 from clothsim.study.metrics import METRICS
-from clothsim.study.points import Settings, build
+from clothsim.study.points import Built, Settings, build
 from clothsim.study.worker import pack_scene
 from clothsim.sweep.draws import Draw, draw
 
@@ -51,8 +51,6 @@ class Run:
         Values by name, drawn ones included.
     seed : int or None
         What it was drawn and disturbed with.
-    data : dict
-        Tables of its scene.
     device : str
         Where collisions are detected.
     error : str or None
@@ -65,7 +63,6 @@ class Run:
     scene: int
     settings: Settings
     seed: int | None
-    data: dict[str, Any]
     device: str
     error: str | None
     name: str
@@ -111,6 +108,8 @@ class Request:
         for scene in self.scenes.values():
             if not isinstance(scene, Scene):
                 raise TypeError(f"scene: expected a clothsim.Scene, got {type(scene).__name__}")
+        if name is not None and not isinstance(name, str):
+            raise InvalidInput(f"name: expected a text, got {name!r}", name="name", expected="a text")
         self.fixed = dict(fixed or {})
         self.combine = one_of("combine", combine, COMBINE)
         self.axes = _axes(vary, self.combine)
@@ -159,21 +158,30 @@ class Request:
         if count > _MOST_RUNS:
             expected = f"at most {_MOST_RUNS} runs"
             raise InvalidInput(f"sweep: expected {expected}, got {count}", name="vary", expected=expected)
-        axes = [*self.axes, *(d.axis() for d in self.draws)]
         out: list[Run] = []
-        digests = {key: fingerprint(_core.__version__, packed) for key, packed in self.packed.items()}
-        for at, key in enumerate(self.scenes):
+        digests = [fingerprint(_core.__version__, packed) for packed in self.packed.values()]
+        for at in range(len(self.scenes)):
             for point, seed in itertools.product(self._points(), self.seeds):
                 drawn = {d.name: d.value(seed) for d in self.draws} if seed is not None else {}
                 settings = {**point, **drawn}
-                built = build(self.bases[key], axes, settings)
-                data = built.data if built.error else {**built.data, "output": self._output(built.data["output"])}
-                what = [digests[key], data, seed, self.disturbance, self.metrics, self.series, self.keep]
+                built = self._built(at, settings)
+                what = [digests[at], built.data, seed, self.disturbance, self.metrics, self.series, self.keep]
                 number = len(out)
                 name = f"{number:06d}-{fingerprint([*what, built.error])}"
                 device = "gpu" if built.device == "gpu" else self.device
-                out.append(Run(number, at, settings, seed, data, device, built.error, name))
+                out.append(Run(number, at, settings, seed, device, built.error, name))
         return out
+
+    def data(self, run: Run) -> dict[str, Any]:
+        """Tables of the scene of a run; made when they are asked for, as they are the most that there is of a run."""
+        return self._built(run.scene, run.settings).data
+
+    def _built(self, scene: int, settings: Settings) -> Built:
+        axes = [*self.axes, *(d.axis() for d in self.draws)]
+        built = build(list(self.bases.values())[scene], axes, settings)
+        return built if built.error else replace(
+            built, data={**built.data, "output": self._output(built.data["output"])}
+        )  # fmt: skip
 
     def _output(self, output: Mapping[str, Any]) -> dict[str, Any]:
         """What a run writes: of the scene's formats those that are kept."""
@@ -241,9 +249,13 @@ def _row(name: str, values: Any) -> Any:
     numbers = all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in (first, last))
     known = set(values) <= {"first", "last", "count", "spacing"} and spacing in ("linear", "geometric")
     if not (numbers and known and isinstance(count, int) and 1 <= count <= _MOST_RUNS):
-        raise InvalidInput(f"vary {name}: expected {expected}, got {dict(values)}", name=name, expected=expected)
+        raise InvalidInput(
+            f"vary {name}: expected {expected}, got {dict(values)}", name=name or "vary", expected=expected
+        )
     if spacing == "geometric" and not (first > 0 and last > 0):  # type: ignore[operator]
-        raise InvalidInput(f"vary {name}: a geometric row is between numbers > 0, got {dict(values)}", name=name)
+        raise InvalidInput(
+            f"vary {name}: a geometric row is between numbers > 0, got {dict(values)}", name=name or "vary"
+        )
     made = np.geomspace(first, last, count) if spacing == "geometric" else np.linspace(first, last, count)  # type: ignore[arg-type]
     return [float(f"{v:.12g}") for v in made]
 
