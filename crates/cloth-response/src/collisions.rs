@@ -19,6 +19,9 @@ pub(crate) const APPROACH: f64 = 1e-3;
 const LEAST_GAP: f64 = 0.1;
 /// Up to there it is pushed this many times as fast as an overlap is undone: at once in steps of 5 ms.
 const LEAST_PUSH: f64 = 10.0;
+/// Impulse of that push at most, on top of what contact carries, where repulsion's spring gives less: in units of what moves the two
+/// points alone. Two pushes that have no room for both would else grow with the number of sweeps.
+const MOST_PUSH: f64 = 4.0;
 
 /// One pair in contact during the step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,16 +74,20 @@ impl Hit {
         let start: Vec3 = (0..4).map(|k| x_t0[stencil.vertices[k] as usize] * stencil.weights[k]).sum();
         let gap_t0 = stencil.normal.dot(&start);
         let to = |gap_t1: f64| (gap_t1 - gap_t0) / motion.dt;
-        let law = if gap_t0 < LEAST_GAP * gap {
-            // Up to there it is a push, which gives no velocity.
-            let from = gap_t0.max(0.0);
-            let up = (LEAST_PUSH * push_fraction(motion.dt)).min(1.0) * (LEAST_GAP * gap - from);
-            NormalLaw { least: to(from), spring: f64::INFINITY, cap: to(from + up) }
-        } else {
-            NormalLaw { least: to(gap_t0.min(gap)), spring: 0.0, cap: f64::NEG_INFINITY }
-        };
         let friction = kernel.state(&params.friction, mesh, self.vertices[0], self.vertices[3]);
-        Contact::new(&stencil, motion.inv_mass, law, friction)
+        if gap_t0 >= LEAST_GAP * gap {
+            let least = to(gap_t0.min(gap));
+            let law = NormalLaw { least, spring: 0.0, on_top: false, rubs: false, cap: f64::NEG_INFINITY };
+            return Contact::new(&stencil, motion.inv_mass, law, friction);
+        }
+        // Up to there it is a push, which gives no velocity.
+        let from = gap_t0.max(0.0);
+        let up = (LEAST_PUSH * push_fraction(motion.dt)).min(1.0) * (LEAST_GAP * gap - from);
+        let spring = motion.dt * params.repulsion_stiffness * (gap - from);
+        let law = NormalLaw { least: to(from), spring, on_top: true, rubs: true, cap: to(from + up) };
+        let mut contact = Contact::new(&stencil, motion.inv_mass, law, friction)?;
+        contact.law.spring = spring.max(MOST_PUSH * contact.mass * up / motion.dt);
+        Some(contact)
     }
 }
 

@@ -16,14 +16,19 @@
 //! - elastic on top of it: where v_n < `cap`, λ is at least `spring` (3.36: `spring` = dt k_r d, `cap` = 0.1 d/dt).
 //!
 //! The elastic part moves the points apart and gives them no velocity: what it adds to the normal impulses, the *push*, counts in
-//! the motion over this step and not in what is kept of it. Friction knows the inelastic part alone. (3.36 keeps it: a tenth of
-//! the overlap per step is a velocity of 0.1 d/dt, and cloth that starts within the thickness leaves the faster the smaller
-//! the step is, with energy from nowhere.)
+//! the motion over this step and not in what is kept of it. (3.36 keeps it: a tenth of the overlap per step is a velocity of
+//! 0.1 d/dt, and cloth that starts within the thickness leaves the faster the smaller the step is, with energy from nowhere.)
+//!
+//! Friction of what is kept knows the inelastic part alone: a push brakes nothing that slides. A push has friction of its own, under
+//! the push alone and with the coefficient at rest, against what pushes slide. Without it, pushes that cannot all have their way, as
+//! those of cloth between two walls with less room than it wants, move it aside wherever their normals are not quite opposite, a
+//! little in every step, and friction of what is kept holds it there: a ratchet that stretches cloth without end.
 //!
 //! λ as a function of v_n is a monotone staircase, so relaxing contact after contact minimises a convex function:
 //! the sweeps converge whatever the number of contacts on a vertex. λ never falls below 0: nothing attracts.
 
 use crate::Vec3;
+use crate::friction::into_cone;
 use crate::friction::kernel::Kernel;
 use cloth_collision::Stencil;
 
@@ -34,6 +39,10 @@ pub(crate) struct NormalLaw {
     pub(crate) least: f64,
     /// Elastic impulse [N s], ≥ 0.
     pub(crate) spring: f64,
+    /// Whether the elastic impulse comes on top of what the inelastic part carries.
+    pub(crate) on_top: bool,
+    /// Whether the elastic impulse has friction.
+    pub(crate) rubs: bool,
     /// Normal velocity above which the elastic impulse does not act [m/s].
     pub(crate) cap: f64,
 }
@@ -44,9 +53,14 @@ impl NormalLaw {
         (lambda + mass * (self.least - v_n)).max(0.0)
     }
 
+    /// Most that the elastic part brings a normal impulse to, of which the inelastic part is `carried` [N s].
+    fn elastic(&self, carried: f64) -> f64 {
+        if self.on_top { carried + self.spring } else { self.spring }
+    }
+
     /// The whole of it.
-    fn impulse(&self, lambda: f64, v_n: f64, mass: f64) -> f64 {
-        let push = self.spring.min(lambda + mass * (self.cap - v_n));
+    fn impulse(&self, lambda: f64, v_n: f64, mass: f64, carried: f64) -> f64 {
+        let push = self.elastic(carried).min(lambda + mass * (self.cap - v_n));
         self.stop(lambda, v_n, mass).max(push)
     }
 }
@@ -67,6 +81,8 @@ pub(crate) struct Contact<S> {
     pub(crate) impulse: Vec3,
     /// What the push adds to its normal part [N s].
     pub(crate) push: f64,
+    /// Friction of the push [N s].
+    rub: Vec3,
 }
 
 impl<S: Copy> Contact<S> {
@@ -88,6 +104,7 @@ impl<S: Copy> Contact<S> {
             friction,
             impulse: Vec3::zeros(),
             push: 0.0,
+            rub: Vec3::zeros(),
         })
     }
 
@@ -111,26 +128,45 @@ impl<S: Copy> Contact<S> {
         (change, change.norm() / self.mass)
     }
 
-    /// The change of the push that fulfils the whole law in the motion, and that of the relative velocity [m/s].
-    pub(crate) fn push_correction(&self, velocity: &[Vec3]) -> (Vec3, f64) {
-        let v_n = self.normal.dot(&self.relative(velocity));
-        let lambda = self.normal.dot(&self.impulse) + self.push;
-        let change = self.law.impulse(lambda, v_n, self.mass) - lambda;
-        (self.normal * change, change.abs() / self.mass)
+    /// The change of the push that fulfils the whole law in the motion `velocity`, and that of friction against what pushes alone
+    /// slide (`kept`: the motion without them), and the change of the relative velocity that it makes [m/s].
+    pub(crate) fn push_correction<K: Kernel<State = S>>(
+        &self,
+        kernel: &K,
+        velocity: &[Vec3],
+        kept: &[Vec3],
+    ) -> (Vec3, f64) {
+        let u = self.relative(velocity);
+        let (v_n, carried) = (self.normal.dot(&u), self.normal.dot(&self.impulse));
+        let lambda = carried + self.push;
+        let by = self.law.impulse(lambda, v_n, self.mass, carried) - lambda;
+        if !self.law.rubs {
+            return (self.normal * by, by.abs() / self.mass);
+        }
+        let most = kernel.at_rest(&self.friction) * (self.push + by).max(0.0);
+        let slip = u - self.relative(kept);
+        let wanted = self.rub - (slip - self.normal * self.normal.dot(&slip)) * self.mass;
+        let change = self.normal * by + (into_cone(wanted, most) - self.rub);
+        (change, change.norm() / self.mass)
     }
 
     /// Whether the whole law asks for more than the impulse gives, by more than `tolerance` [m/s].
     pub(crate) fn wants_push(&self, velocity: &[Vec3], tolerance: f64) -> bool {
-        let lambda = self.normal.dot(&self.impulse) + self.push;
+        let carried = self.normal.dot(&self.impulse);
+        let lambda = carried + self.push;
         let v_n = self.normal.dot(&self.relative(velocity));
-        self.law.spring > lambda && self.law.cap > v_n + tolerance
+        self.law.elastic(carried) > lambda && self.law.cap > v_n + tolerance
     }
 
     /// Books a change of the impulse, or of the push; `change` hears of each vertex and the change of its velocity.
     #[inline]
     pub(crate) fn apply(&mut self, by: Vec3, push: bool, mut change: impl FnMut(usize, Vec3)) {
         if push {
-            self.push += self.normal.dot(&by);
+            let along = self.normal.dot(&by);
+            self.push += along;
+            if self.law.rubs {
+                self.rub += by - self.normal * along;
+            }
         } else {
             self.impulse += by;
         }
@@ -185,7 +221,7 @@ mod tests {
         Stencil { kind: StencilKind::EdgeEdge, weights: [0.75, 0.25, -0.5, -0.5], ..vertex_triangle() }
     }
 
-    const INELASTIC: NormalLaw = NormalLaw { least: 0.0, spring: 0.0, cap: 0.0 };
+    const INELASTIC: NormalLaw = NormalLaw { least: 0.0, spring: 0.0, on_top: false, rubs: false, cap: 0.0 };
 
     fn solve(
         stencil: &Stencil,
@@ -197,7 +233,7 @@ mod tests {
         let mut contact = Contact::new(stencil, &inv_mass, law, mu).expect("a free vertex");
         let (change, _) = contact.correction(&Coulomb::default(), velocity);
         contact.apply(change, false, |v, by| velocity[v] += by);
-        let (change, _) = contact.push_correction(velocity);
+        let (change, _) = contact.push_correction(&Coulomb::default(), velocity, velocity);
         contact.apply(change, true, |v, by| velocity[v] += by);
         contact
     }
@@ -235,7 +271,7 @@ mod tests {
     #[test]
     fn nothing_attracts() {
         for spring in [0.0, 1.0] {
-            let law = NormalLaw { least: 0.0, spring, cap: 0.01 };
+            let law = NormalLaw { least: 0.0, spring, on_top: false, rubs: false, cap: 0.01 };
             let mut v = [Vec3::y() * 0.5, Vec3::zeros(), Vec3::zeros(), Vec3::zeros()];
             let contact = solve(&vertex_triangle(), [1.0; 4], law, 0.5, &mut v);
             assert_eq!(contact.impulse, Vec3::zeros());
@@ -248,13 +284,15 @@ mod tests {
     #[test]
     fn repulsion_ends_at_the_cap() {
         let (d, dt) = (1e-3, 0.01);
-        let law = NormalLaw { least: 0.0, spring: f64::INFINITY, cap: 0.1 * d / dt };
+        let law =
+            NormalLaw { least: 0.0, spring: f64::INFINITY, on_top: false, rubs: false, cap: 0.1 * d / dt };
         let mut v = [Vec3::y() * -0.05, Vec3::zeros(), Vec3::zeros(), Vec3::zeros()];
         let contact = solve(&vertex_triangle(), [1.0; 4], law, 0.0, &mut v);
         assert!((contact.relative(&v).y - 0.01).abs() < ROUNDING);
 
         // 1/m = 1.38: a spring of 0.04/1.38 changes v_n by 0.04, less than stopping it needs.
-        let law = NormalLaw { least: 0.0, spring: 0.04 / 1.38, cap: 0.1 * d / dt };
+        let law =
+            NormalLaw { least: 0.0, spring: 0.04 / 1.38, on_top: false, rubs: false, cap: 0.1 * d / dt };
         let mut v = [Vec3::y() * -0.05, Vec3::zeros(), Vec3::zeros(), Vec3::zeros()];
         let contact = solve(&vertex_triangle(), [1.0; 4], law, 0.0, &mut v);
         assert!(contact.relative(&v).y.abs() < ROUNDING, "the inelastic part still stops it");
@@ -278,7 +316,7 @@ mod tests {
     /// friction.
     #[test]
     fn relaxation_is_idempotent() {
-        let law = NormalLaw { least: 0.0, spring: 2.0, cap: 0.01 };
+        let law = NormalLaw { least: 0.0, spring: 2.0, on_top: false, rubs: false, cap: 0.01 };
         for mu in [0.0, 0.1, 10.0] {
             let mut kept = [Vec3::new(0.7, -0.4, 0.2), Vec3::x(), Vec3::zeros(), Vec3::zeros()];
             let mut contact = Contact::new(&vertex_triangle(), &[1.0, 2.0, 3.0, 0.0], law, mu).expect("free");
@@ -287,13 +325,13 @@ mod tests {
             let inelastic = contact.impulse;
             assert!(contact.relative(&kept).y.abs() < ROUNDING && contact.wants_push(&kept, 1e-6));
             let mut moved = kept;
-            let (change, _) = contact.push_correction(&moved);
+            let (change, _) = contact.push_correction(&Coulomb::default(), &moved, &kept);
             contact.apply(change, true, |v, by| moved[v] += by);
             assert!((contact.relative(&moved).y - 0.01).abs() < ROUNDING && contact.push > 0.0);
             assert!(!contact.wants_push(&moved, 1e-6));
             assert_eq!(contact.impulse, inelastic);
             assert!(contact.correction(&Coulomb::default(), &kept).1 < ROUNDING);
-            assert!(contact.push_correction(&moved).1 < ROUNDING);
+            assert!(contact.push_correction(&Coulomb::default(), &moved, &kept).1 < ROUNDING);
             let slip = |v: &[Vec3]| contact.relative(v) - contact.normal * contact.relative(v).y;
             assert!((slip(&moved) - slip(&kept)).norm() < ROUNDING);
         }

@@ -39,6 +39,10 @@ const PUSH_FRACTION: f64 = 0.1;
 /// step would do work without bound as steps get smaller.
 const PUSH_TIME: f64 = 0.05;
 
+/// Overlap, as a fraction of the rest gap, from which a push has friction. What has no room for its thickness on both sides is nearer to
+/// one of them than half of it.
+const DEEP: f64 = 0.45;
+
 /// The fraction of the overlap that a step of `dt` \[s\] may undo.
 pub(crate) fn push_fraction(dt: f64) -> f64 {
     PUSH_FRACTION.min(dt / PUSH_TIME)
@@ -78,9 +82,10 @@ fn law(gap_t0: f64, gap_t1: f64, v_n: f64, gap: f64, stiffness: f64, dt: f64) ->
     // The end gap is gap_t1 + dt (v_n' - v_n).
     let least = v_n + (gap.min(gap_t0) - gap_t1) / dt;
     if overlap < 0.0 {
-        NormalLaw { least, spring: 0.0, cap: f64::NEG_INFINITY }
+        NormalLaw { least, spring: 0.0, on_top: false, rubs: false, cap: f64::NEG_INFINITY }
     } else {
-        NormalLaw { least, spring: dt * stiffness * overlap, cap: least + push_fraction(dt) * overlap / dt }
+        let (spring, cap) = (dt * stiffness * overlap, least + push_fraction(dt) * overlap / dt);
+        NormalLaw { least, spring, on_top: false, rubs: overlap > DEEP * gap, cap }
     }
 }
 

@@ -270,7 +270,7 @@ impl<K: Kernel> ContactSet<K> {
         }
         let contact = &mut self.contacts[i];
         let (change, error) = if push {
-            contact.push_correction(&motion.buffers.velocity)
+            contact.push_correction(&self.kernel, &motion.buffers.velocity, motion.buffers.kept())
         } else {
             contact.correction(&self.kernel, motion.buffers.kept())
         };

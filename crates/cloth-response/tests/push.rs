@@ -32,6 +32,84 @@ fn gaps(world: &World) -> [f64; 2] {
     [height(0) - height(1), height(1) - height(2)]
 }
 
+/// What is wrong with a step of [`pressed`] layers from `start`, in which nothing but pushes may act.
+///
+/// `pushed`: what the response says that they did [kg m].
+fn wrong(world: &World, start: &[Vec3], v_t0: &[Vec3], pushed: Vec3) -> Option<&'static str> {
+    let change = |i: usize| (world.v[i] - v_t0[i]).norm();
+    if world.body(0).chain(world.body(1)).any(|i| change(i) > ROUNDING + TOLERANCE) {
+        return Some("a push left velocity");
+    }
+    let up = |i: usize| (world.x[i].y - start[i].y) / world.inv_mass[i];
+    let [upper, lower] = [0, 1].map(|b| world.body(b).map(up).sum::<f64>());
+    if !(upper > 0.0 && lower > 0.0 && upper > lower) {
+        return Some("a push brought layers nearer");
+    }
+    ((pushed.y - upper - lower).abs() > 1e-3 * (upper + lower)).then_some("a push was not told")
+}
+
+#[test]
+fn planted_faults_of_pushes_are_caught() {
+    let dt = 2e-3;
+    let mut world = pressed();
+    let (start, v_t0) = (world.x.clone(), world.v.clone());
+    let pushed = world.step(dt).pushed;
+    assert_eq!(wrong(&world, &start, &v_t0, pushed), None);
+    let (end, v_t1) = (world.x.clone(), world.v.clone());
+    for i in 0..end.len() {
+        world.v[i] = v_t1[i] + (end[i] - start[i]) / dt;
+    }
+    assert_eq!(wrong(&world, &start, &v_t0, pushed), Some("a push left velocity"));
+    world.v = v_t1;
+    for i in 0..end.len() {
+        world.x[i] = start[i] * 2.0 - end[i];
+    }
+    assert_eq!(wrong(&world, &start, &v_t0, pushed), Some("a push brought layers nearer"));
+    world.x = end;
+    assert_eq!(wrong(&world, &start, &v_t0, pushed * 1.01), Some("a push was not told"));
+}
+
+/// Slope of the upper wall of [`jammed`].
+const SLOPE: f64 = 0.02;
+
+/// How far a sheet goes sideways in a step of `dt` that has no room: it is a thickness above a floor, and one border touches a
+/// wall above that leans by [`SLOPE`], so that what pushes it down pushes it aside too.
+fn jammed(friction: f64, dt: f64) -> (f64, World) {
+    let friction = FrictionRule::uniform(FrictionLaw::Coulomb { mu_c: friction });
+    let wall = placed(
+        grid(0.4, 0.4, 4, 4).unwrap(),
+        [0.0, 0.0, SLOPE.atan()],
+        [0.0, THICKNESS + 2e-6 + 0.05 * SLOPE, 0.0],
+    );
+    let mut world = World::new(
+        &[
+            cloth(placed(grid(0.1, 0.1, 3, 3).unwrap(), [0.0; 3], [0.0, THICKNESS, 0.0])),
+            collider(grid(0.4, 0.4, 4, 4).unwrap()),
+            collider(wall),
+        ],
+        ResponseParams { thickness: THICKNESS, friction, ..ResponseParams::default() },
+    );
+    world.gravity = Vec3::zeros();
+    let start = world.x.clone();
+    world.step(dt);
+    let side = |i: usize| (world.x[i].x - start[i].x).abs();
+    (world.body(0).map(side).fold(0.0, f64::max), world)
+}
+
+/// Pushes that cannot all have their way end at what they are able to, and hold each other by friction: they do not wedge the cloth
+/// out, step after step, as far as the sweeps go on.
+#[test]
+fn pushes_against_each_other_move_nothing_sideways() {
+    let dt = 1e-3;
+    let (free, world) = jammed(0.0, dt);
+    let heaviest = world.body(0).map(|i| world.inv_mass[i]).fold(0.0, f64::max);
+    // The spring of a whole overlap, on a corner, by as many pairs as meet there.
+    let most = 6.0 * SLOPE * 20.0 * THICKNESS * dt * dt * heaviest;
+    assert!(free > 1e-6 && free < most, "{free} of {most}");
+    let (held, _) = jammed(0.3, dt);
+    assert!(held < 2.0 * TOLERANCE * dt + 1e-12, "{held} where {free} is free");
+}
+
 #[test]
 fn a_push_leaves_no_velocity_and_takes_its_time() {
     for (dt, steps) in [(1e-4, 400), (1e-3, 40), (5e-3, 8)] {

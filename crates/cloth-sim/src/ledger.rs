@@ -21,9 +21,6 @@ use cloth_core::{Motion, Work};
 /// Part of the energy that has been in the motion which a step may make: what ordinary steps of contact make stays below.
 const ALLOWED: f64 = 0.5;
 
-/// What repulsion may do in a step, as a multiple of what it does against gravity: layers that part are pushed unevenly.
-const PUSHED: f64 = 4.0;
-
 /// Energies that a step is judged by: a part of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Ledger {
@@ -33,7 +30,8 @@ pub(crate) struct Ledger {
     pub(crate) level: f64,
     /// What the energy might be if no step had made any [J].
     pub(crate) base: f64,
-    /// Most kinetic and elastic energy of steps before which none was made, or what was is lost again [J].
+    /// Most kinetic and elastic energy of steps before which none was made, or what was is lost again; while pins, colliders or wind
+    /// drive the cloth, that of the last step [J].
     pub(crate) scale: f64,
 }
 
@@ -72,15 +70,32 @@ impl Simulation {
         })
     }
 
-    /// The ledger after the step of `dt` \[s\] to `end`, in which repulsion pushed by `pushed` \[kg m\]
-    /// ([`cloth_response::ResponseInfo::pushed`]).
+    /// How far repulsion pushed each vertex in the response that led to `end` \[m\]; none where nobody asks.
+    pub(crate) fn pushes(&self, end: &State, dt: f64) -> Option<Vec<Vec3>> {
+        let contact = self.contact.as_ref().filter(|_| self.judges(end))?;
+        contact.responder.pushes(&self.inv_mass, dt)
+    }
+
+    /// Work of repulsion that pushed the cloth by `pushes` to `end` \[J\]: what it did against gravity, and what the cloth as it is
+    /// has more of potential energy than without.
+    fn work_of_pushes(&self, end: &State, pushes: &[Vec3]) -> [f64; 2] {
+        let potential = |x: &[Vec3]| {
+            let energy = self.energy_at(x, &end.v);
+            (energy.total() - energy.kinetic, energy.gravity)
+        };
+        let before: Vec<Vec3> = end.x.iter().zip(pushes).map(|(x, push)| x - push).collect();
+        let (after, before) = (potential(&end.x), potential(&before));
+        [after.1 - before.1, after.0 - before.0].map(|work| work.max(0.0))
+    }
+
+    /// The ledger after the step of `dt` \[s\] to `end`, in which repulsion pushed each vertex by `pushes` \[m\].
     ///
     /// With `accept` a step that made energy passes, and the ledger starts anew from there; but for one that made too much.
     pub(crate) fn audit(
         &self,
         end: &State,
         dt: f64,
-        pushed: Vec3,
+        pushes: Option<&[Vec3]>,
         accept: bool,
         report: &mut StepReport,
     ) -> Result<Ledger, Failure> {
@@ -104,16 +119,19 @@ impl Simulation {
             let (level, scale) = sums(&self.state.x, &self.state.v);
             Ledger { open: true, level, base: level, scale }
         };
-        // What starts nearer than its thickness is moved apart, against gravity where it has to be, and bent on the way.
-        let gravity = Vec3::from(self.scene.gravity());
-        let lifted = PUSHED * (-gravity.dot(&pushed)).max(0.0);
         let through_contact = self.most_through_contact(end);
-        let done = work.pins.max(0.0) + work.air.max(0.0) + through_contact + lifted;
-        let (level, base) = (ledger.level + done, ledger.base + done);
+        let driven = through_contact > 0.0 || self.is_driven(end);
+        let done = work.pins.max(0.0) + work.air.max(0.0) + through_contact;
+        let (mut level, mut base) = (ledger.level + done, ledger.base + done);
+        // What starts nearer than its thickness is moved apart, against gravity where it has to be, and bent on the way. What is lost
+        // anyway need not be known.
+        if let Some(pushes) = pushes.filter(|_| energy > level.min(base)) {
+            let [lifted, all] = self.work_of_pushes(end, pushes);
+            (level, base) = (level + all.max(lifted), base + lifted);
+        }
         let (made, opening) = (energy - level, self.opening());
         if made > ALLOWED * ledger.scale + opening {
-            let runs_away =
-                energy - base > ledger.scale + opening && through_contact == 0.0 && !self.is_driven(end);
+            let runs_away = energy - base > ledger.scale + opening && !driven;
             if !accept || runs_away {
                 return Err(Failure::Energy { made, level });
             }
@@ -122,8 +140,15 @@ impl Simulation {
             return Ok(Ledger { open: true, level: energy, base, scale: ledger.scale });
         }
         note(report, entry);
-        // What was made is none of the motion's.
-        let scale = if energy <= base { ledger.scale.max(moving) } else { ledger.scale };
+        // What was made is none of the motion's. What drives the cloth brings energy that is lost again: once it stands still,
+        // only what there is then is left.
+        let scale = if driven {
+            moving
+        } else if energy <= base {
+            ledger.scale.max(moving)
+        } else {
+            ledger.scale
+        };
         Ok(Ledger { open: true, level: level.min(energy), base: base.min(energy), scale })
     }
 

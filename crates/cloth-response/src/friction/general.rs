@@ -231,6 +231,10 @@ impl Kernel for General {
     }
 
     #[inline]
+    fn at_rest(&self, state: &Sliding) -> f64 {
+        self.laws[state.law as usize].mu_s
+    }
+
     fn bound(&self, state: &mut Sliding, stop: Vec3, lambda: f64, mass: f64) -> Vec3 {
         let (needed, threshold) = (stop.norm(), self.laws[state.law as usize].mu_s * lambda);
         if !state.broken {

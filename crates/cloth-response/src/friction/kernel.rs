@@ -22,6 +22,9 @@ pub(crate) trait Kernel {
     /// Whether the contact has friction.
     fn acts(&self, state: &Self::State) -> bool;
 
+    /// Coefficient of a contact that does not slide.
+    fn at_rest(&self, state: &Self::State) -> f64;
+
     /// The tangential impulse where `stop` is the one that ends all sliding \[N s\], under the normal impulse λ \[N s\].
     ///
     /// `mass`: the contact's effective mass \[kg\].
@@ -89,6 +92,11 @@ impl Kernel for Coulomb {
     #[inline]
     fn acts(&self, state: &f64) -> bool {
         *state > 0.0
+    }
+
+    #[inline]
+    fn at_rest(&self, state: &f64) -> f64 {
+        *state
     }
 
     #[inline]

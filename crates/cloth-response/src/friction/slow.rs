@@ -87,6 +87,11 @@ impl Kernel for Slow {
     }
 
     #[inline]
+    fn at_rest(&self, state: &u32) -> f64 {
+        self.laws[*state as usize].mu_s
+    }
+
+    #[inline]
     fn bound(&self, state: &mut u32, stop: Vec3, lambda: f64, _mass: f64) -> Vec3 {
         into_cone(stop, self.laws[*state as usize].mu_s * lambda)
     }

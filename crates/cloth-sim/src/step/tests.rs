@@ -1,6 +1,8 @@
 //! A step that fails, and what it leaves.
 
-use crate::{Assets, Scene, SimError, Simulation, SimulationOptions};
+use super::touches;
+use crate::ledger::Ledger;
+use crate::{Assets, Scene, SimError, Simulation, SimulationOptions, Vec3};
 use std::ops::ControlFlow;
 
 const SCENE: &str = r#"
@@ -351,6 +353,31 @@ fn energy_that_contact_makes_is_a_failed_step() {
     assert!(sim.report.refused.iter().any(|r| r.reason.contains("contact made")), "{:?}", sim.report.refused);
     assert!(made > 5.0, "the scene has something to find: {made}");
     assert!(kept < 0.2 * made, "{kept} of {made}");
+}
+
+/// Where contact goes on making more energy than there is, the cloth stops where it is, and the run goes on.
+#[test]
+fn what_runs_away_stands_still_where_it_was() {
+    let mut sim = landing(true);
+    while sim.time() < 0.6 {
+        sim.step().unwrap();
+    }
+    assert!(touches(&sim.state) && sim.state.pace.ledger.open, "it lies on the floor");
+    let mut free = Simulation::resume(&sim.checkpoint(), Some(1)).unwrap();
+    let (x, time) = (sim.state.x.clone(), sim.time());
+    sim.state.v[0].y += 1e-4;
+    // A joule less than there is: whatever the step, it seems to have made one.
+    let ledger = sim.state.pace.ledger;
+    sim.state.pace.ledger =
+        Ledger { open: true, level: ledger.level - 1.0, base: ledger.base - 1.0, scale: 0.0 };
+    sim.step().unwrap();
+    assert_eq!(sim.state.x, x);
+    assert!(sim.state.v.iter().chain(&sim.state.contact_force).all(|v| *v == Vec3::zeros()));
+    assert!((sim.time() - time - 0.0166).abs() < 1e-12);
+    assert!(sim.report.refused.iter().any(|r| r.time >= time && r.reason.contains("contact made")));
+    free.state.v[0].y += 1e-4;
+    free.step().unwrap();
+    assert_ne!(free.state.x, x, "without the loss it moves");
 }
 
 /// A flag held by two corners in wind; they move up, if anything.
