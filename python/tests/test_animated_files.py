@@ -433,7 +433,6 @@ def test_usd_without_a_range_of_time_takes_that_of_what_moves(tmp_path: Path) ->
     assert animation.positions[:, 0, 0].tolist() == pytest.approx([0, 1, 2, 3, 4, 5, 6], abs=1e-6)
 
 
-
 def test_usd_skeletons_are_baked(tmp_path: Path) -> None:
     pytest.importorskip("pxr", reason="the extra 'usd' is not installed")
     from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
