@@ -53,11 +53,6 @@ impl MotionBuffers {
         if self.kept.is_empty() { &self.velocity } else { &self.kept }
     }
 
-    /// Whether there may be pushes.
-    pub(crate) fn is_parted(&self) -> bool {
-        !self.kept.is_empty()
-    }
-
     /// Memory [B].
     pub(crate) fn bytes(&self) -> usize {
         bytes_of(&self.end)
@@ -150,7 +145,7 @@ impl<'a> Motion<'a> {
 
     /// Whether there may be pushes.
     pub(crate) fn is_parted(&self) -> bool {
-        self.buffers.is_parted()
+        !self.buffers.kept.is_empty()
     }
 
     /// From here on pushes change the motion and not what is kept of it.

@@ -245,17 +245,6 @@ impl Responder {
         Ok(ResponseInfo { pushed, ..info.unwrap_or_default() })
     }
 
-    /// How far pushes moved each vertex in the last response, in a step of `dt` \[s\] \[m\]; `None` if there were none.
-    ///
-    /// `inv_mass`: as it was given. Positions without pushes are those of the step less these ways.
-    pub fn pushes(&self, inv_mass: &[f64], dt: f64) -> Option<Vec<Vec3>> {
-        let buffers = &self.buffers;
-        let way = |i: usize| {
-            if inv_mass[i] > 0.0 { (buffers.velocity[i] - buffers.kept()[i]) * dt } else { Vec3::zeros() }
-        };
-        buffers.is_parted().then(|| (0..inv_mass.len()).map(way).collect())
-    }
-
     /// Writes the motion of what is not prescribed; Σ m times the way of pushes [kg m].
     fn write(&self, inv_mass: &[f64], x_t1: &mut [Vec3], v: &mut [Vec3], dt: f64) -> Vec3 {
         let mut pushed = Vec3::zeros();

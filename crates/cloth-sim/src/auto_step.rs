@@ -87,7 +87,7 @@ fn order(method: Method) -> i32 {
 struct Doubled {
     state: State,
     /// Σ m times the way of repulsion's pushes [kg m].
-    pushes: Option<Vec<Vec3>>,
+    pushed: Vec3,
     /// Estimated error of the two halves [m].
     error: f64,
     /// Sides of near pairs at the start, for an attempt that is refused; those of the middle stand.
@@ -116,7 +116,7 @@ impl Simulation {
             control.size = control.size.clamp(time.dt_min, time.dt_max);
             let (dt, t1) = cut(start, end, control.size);
             let failure = match self.doubled(t1, dt, order, &mut report) {
-                Ok(Doubled { mut state, pushes, error, sides, seconds }) => {
+                Ok(Doubled { mut state, pushed, error, sides, seconds }) => {
                     let ratio = error / (SHARE * time.dt_tolerance);
                     let last = report.rejected == MAX_REJECTED || dt <= time.dt_min;
                     if ratio > 1.0 && !last {
@@ -126,7 +126,7 @@ impl Simulation {
                         continue;
                     }
                     let floor = report.retries >= time.max_halvings || 0.5 * dt < time.dt_min;
-                    match self.audit(&state, dt, pushes.as_deref(), floor, &mut report) {
+                    match self.audit(&state, dt, pushed, floor, &mut report) {
                         Ok(ledger) => state.pace.ledger = ledger,
                         Err(failure) => {
                             self.remember_sides(sides);
@@ -195,9 +195,9 @@ impl Simulation {
         first.note(report);
         second.note(report);
         let [a, b, c] = [&whole, &first, &second].map(Trial::seconds);
-        let pushes = together(first.pushes, second.pushes);
+        let pushed = first.pushed() + second.pushed();
         let seconds = [0, 1].map(|k| a[k] + b[k] + c[k]);
-        Ok(Doubled { state: end, pushes, error, sides, seconds })
+        Ok(Doubled { state: end, pushed, error, sides, seconds })
     }
 
     /// From the middle of a step, where the state is: the second half, the step's end, and its estimated error [m].
@@ -235,14 +235,6 @@ impl Simulation {
         if let (Some(contact), Some(sides)) = (&mut self.contact, sides) {
             contact.responder.set_sides(sides);
         }
-    }
-}
-
-/// The pushes of both halves of a step.
-fn together(first: Option<Vec<Vec3>>, second: Option<Vec<Vec3>>) -> Option<Vec<Vec3>> {
-    match (first, second) {
-        (Some(first), Some(second)) => Some(first.iter().zip(&second).map(|(a, b)| a + b).collect()),
-        (first, second) => first.or(second),
     }
 }
 

@@ -3,8 +3,10 @@
 //! Implicit dynamics lose energy, and so do friction and impact. But impulses move single vertices, which stiff cloth
 //! answers in the next solve only: a large step can make elastic energy out of nothing. The ledger holds the least energy \[J\]
 //! that the cloth has had since contact began, plus what has been done to it since: the work of pins and of air
-//! ([`cloth_core::Work`]; what they take away is not counted), and the most that moving colliders and pins can have done through
-//! contact. A step that exceeds it by more than half of the energy that has been in the motion fails like any other, and is tried with
+//! ([`cloth_core::Work`]; what they take away is not counted), the most that moving colliders and pins can have done through
+//! contact, and what repulsion did against gravity as it moved apart what is nearer than the thickness, −g·Σ m Δx over its pushes.
+//! What these bend on the way is made by contact like any other energy: it goes as the square of a push, and smaller steps make less
+//! of it. A step that exceeds it by more than half of the energy that has been in the motion fails like any other, and is tried with
 //! half the size. At the floor, `time.max_halvings` halvings, it is accepted, and the report says how much was made. But where all that
 //! was made since contact began and is not lost again is more than all the energy that has been in the motion, and nothing drives it, the
 //! cloth stays where it is and loses its velocity: a board of a millimetre that hits something with one corner would else be bent by
@@ -70,32 +72,15 @@ impl Simulation {
         })
     }
 
-    /// How far repulsion pushed each vertex in the response that led to `end` \[m\]; none where nobody asks.
-    pub(crate) fn pushes(&self, end: &State, dt: f64) -> Option<Vec<Vec3>> {
-        let contact = self.contact.as_ref().filter(|_| self.judges(end))?;
-        contact.responder.pushes(&self.inv_mass, dt)
-    }
-
-    /// Work of repulsion that pushed the cloth by `pushes` to `end` \[J\]: what it did against gravity, and what the cloth as it is
-    /// has more of potential energy than without.
-    fn work_of_pushes(&self, end: &State, pushes: &[Vec3]) -> [f64; 2] {
-        let potential = |x: &[Vec3]| {
-            let energy = self.energy_at(x, &end.v);
-            (energy.total() - energy.kinetic, energy.gravity)
-        };
-        let before: Vec<Vec3> = end.x.iter().zip(pushes).map(|(x, push)| x - push).collect();
-        let (after, before) = (potential(&end.x), potential(&before));
-        [after.1 - before.1, after.0 - before.0].map(|work| work.max(0.0))
-    }
-
-    /// The ledger after the step of `dt` \[s\] to `end`, in which repulsion pushed each vertex by `pushes` \[m\].
+    /// The ledger after the step of `dt` \[s\] to `end`, in which repulsion pushed by `pushed` \[kg m\]
+    /// ([`cloth_response::ResponseInfo::pushed`]).
     ///
     /// With `accept` a step that made energy passes, and the ledger starts anew from there; but for one that made too much.
     pub(crate) fn audit(
         &self,
         end: &State,
         dt: f64,
-        pushes: Option<&[Vec3]>,
+        pushed: Vec3,
         accept: bool,
         report: &mut StepReport,
     ) -> Result<Ledger, Failure> {
@@ -121,14 +106,10 @@ impl Simulation {
         };
         let through_contact = self.most_through_contact(end);
         let driven = through_contact > 0.0 || self.is_driven(end);
-        let done = work.pins.max(0.0) + work.air.max(0.0) + through_contact;
-        let (mut level, mut base) = (ledger.level + done, ledger.base + done);
-        // What starts nearer than its thickness is moved apart, against gravity where it has to be, and bent on the way. What is lost
-        // anyway need not be known.
-        if let Some(pushes) = pushes.filter(|_| energy > level.min(base)) {
-            let [lifted, all] = self.work_of_pushes(end, pushes);
-            (level, base) = (level + all.max(lifted), base + lifted);
-        }
+        // What starts nearer than its thickness is moved apart, against gravity where it has to be.
+        let lifted = (-Vec3::from(self.scene.gravity()).dot(&pushed)).max(0.0);
+        let done = work.pins.max(0.0) + work.air.max(0.0) + through_contact + lifted;
+        let (level, base) = (ledger.level + done, ledger.base + done);
         let (made, opening) = (energy - level, self.opening());
         if made > ALLOWED * ledger.scale + opening {
             let runs_away = energy - base > ledger.scale + opening && !driven;

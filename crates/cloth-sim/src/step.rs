@@ -110,8 +110,6 @@ pub(crate) struct Trial {
     dynamics: StepInfo,
     /// What response did, and the solves of contact constraints.
     contact: Option<(ResponseInfo, usize)>,
-    /// How far repulsion pushed each vertex [m]; none where the energy of the step is not judged.
-    pub(crate) pushes: Option<Vec<Vec3>>,
     /// What it took [s].
     seconds: f64,
 }
@@ -120,6 +118,11 @@ impl Trial {
     /// Seconds of continuous detection, and of all.
     pub(crate) fn seconds(&self) -> [f64; 2] {
         [self.contact.as_ref().map_or(0.0, |(info, _)| seconds_of_detection(info)), self.seconds]
+    }
+
+    /// Σ m times the way of repulsion's pushes [kg m].
+    pub(crate) fn pushed(&self) -> Vec3 {
+        self.contact.as_ref().map_or_else(Vec3::zeros, |(info, _)| info.pushed)
     }
 
     /// Adds the counts of its dynamics to the step's.
@@ -181,7 +184,7 @@ impl Simulation {
     ) -> Result<(), Failure> {
         let mut trial = self.trial(t1, dt, report)?;
         let floor = floor || 0.5 * dt < self.scene.time.dt_min;
-        trial.state.pace.ledger = match self.audit(&trial.state, dt, trial.pushes.as_deref(), floor, report) {
+        trial.state.pace.ledger = match self.audit(&trial.state, dt, trial.pushed(), floor, report) {
             Err(failure @ Failure::Energy { .. }) if floor => {
                 self.refuse(dt, &failure);
                 trial.note_work(report);
@@ -223,9 +226,8 @@ impl Simulation {
         let (dynamics, holds, solves) = self.dynamics(dt, &mut x, &mut v, &pin_x, &pin_v, report)?;
         self.check(&x, &v, report)?;
         let (state, info) = self.meet(t1, dt, x, v, holds, report)?;
-        let pushes = self.pushes(&state, dt);
         let seconds = started.elapsed().as_secs_f64();
-        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), pushes, seconds })
+        Ok(Trial { state, dynamics, contact: info.map(|info| (info, solves)), seconds })
     }
 
     /// The end of the step without contact but for constraints, what those did, and their solves.
