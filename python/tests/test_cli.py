@@ -59,7 +59,9 @@ def test_equal_runs_give_equal_bytes(
 
 def untimed(report: dict[str, Any]) -> dict[str, Any]:
     """Return what does not depend on clocks, threads and the memory that contact happened to hold."""
-    frames = [{key: value for key, value in frame.items() if key != "seconds"} for frame in report["frames"]]
+    frames = [
+        {key: value for key, value in frame.items() if key not in ("seconds", "effects")} for frame in report["frames"]
+    ]
     totals = {key: value for key, value in report["totals"].items() if "seconds" not in key}
     effects = [(effect["name"], effect["elements"]) for effect in report["effects"]]
     kept = ("scene", "scene_digest", "error", "simulated_seconds", "frame_count", "fps", "bodies", "outputs")

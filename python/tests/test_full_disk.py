@@ -51,7 +51,8 @@ def test_an_output_for_which_there_is_no_room(tmp_path: Path, key: str, monkeypa
             Job(scene, out, progress=False).run()
         files = [p for p in (tmp_path / "roomy").rglob("*") if p.is_file() and p.name != "report.json"]
         size = sum(p.stat().st_size for p in files)
-        for share in (0.0, 0.1, 0.3, 0.5, 0.8, 0.95):
+        # A picture of clocks has another size each time: near its end it might fit, and the report not.
+        for share in (0.0, 0.1, 0.3, 0.5, 0.8, *(() if key == "plots" else (0.95,))):
             with filled(disk, int(share * size)), pytest.raises(cs.OutputError) as caught:
                 Job(scene, out, resume=True, progress=False).run()
             assert "no space left" in str(caught.value)

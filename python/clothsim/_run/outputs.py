@@ -97,16 +97,20 @@ class Outputs:
             write_whole(self._out / "last_good.checkpoint", self._simulation._core.checkpoint(0))
             written.append("last_good.checkpoint")
         if failures:
-            raise OutputError(
-                0, f"{self._out}: {'; '.join(failures)}. The simulation itself is kept: --resume writes what is missing"
-            )
+            raise self._missing("; ".join(failures))
         states = self._states.finish(len(self._frames))
         if states:
             written.append(FOLDER)
         report = self._report(written, states)
-        write_whole(self._out / "report.json", json.dumps(report, indent=1).encode())
+        try:
+            write_whole(self._out / "report.json", json.dumps(report, indent=1).encode())
+        except OutputError as error:
+            raise self._missing(f"report.json: {error.strerror}") from error
         self._remove_stale([*written, "report.json"])
         return {key: value for key, value in report.items() if key != "frames"}
+
+    def _missing(self, what: str) -> OutputError:
+        return OutputError(0, f"{self._out}: {what}. The simulation itself is kept: --resume writes what is missing")
 
     def _film_strip(self, path: Path) -> None:
         self._recording.film_strip(path)

@@ -126,8 +126,9 @@ def here(measured: Measured) -> str:
 
 def checks(measured: Measured) -> Sequence[Check]:
     """The thesis's order."""
+    # What these coefficients can leave bends a hinge by less than a degree: how the folds happen to lie moves them more.
     return [
-        *residual.checks(measured.runs, "thesis 4.5.2, figure 4.10"),
+        *residual.checks(measured.runs, "thesis 4.5.2, figure 4.10", rests=False),
         Check.true(
             "no residual curvature above λ M0/(μ b2)", measured.runs["λ = 0.3"].largest <= _MOST, "(4.6), (4.11)"
         ),

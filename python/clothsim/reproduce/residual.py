@@ -211,7 +211,8 @@ def here(runs: Mapping[str, Run]) -> str:
 def checks(runs: Mapping[str, Run], source: str, *, rests: bool = True) -> list[Check]:
     """The order that the thesis shows: more is left the larger λ; every run ends without intersections.
 
-    ``runs`` are in the order of λ, the law without plasticity first. Shapes are compared where the cloth ``rests``.
+    ``runs`` are in the order of λ, the law without plasticity first. Shapes are compared where the cloth
+    ``rests`` and what is left in it decides them.
     """
     ordered = list(runs.values())
     means, bent = [r.mean for r in ordered], [r.deviation for r in ordered]
