@@ -126,7 +126,7 @@ def here(measured: Measured) -> str:
 
 def checks(measured: Measured) -> Sequence[Check]:
     """The thesis's order."""
-    # What these coefficients can leave bends a hinge by less than a degree: how the folds happen to lie moves them more.
+    # What these coefficients can leave bends a hinge by less than a degree: how folds happen to lie moves them more.
     return [
         *residual.checks(measured.runs, "thesis 4.5.2, figure 4.10", rests=False),
         Check.true(
