@@ -17,6 +17,11 @@ mod simulation;
 
 use pyo3::prelude::*;
 
+/// Gives memory that a call has freed less than a second ago to the next call without a fault per page, on every thread;
+/// Python's own stays as it is.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The compiled half of clothsim. Private: use the package.
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
