@@ -1,8 +1,8 @@
 """Detection beside IPC Toolkit on the published frame pairs, and intersections also on sheets, in one run.
 
-Usage: ``python benches/compare_ipctk.py [--repeats N] [--scenes NAME ...] [--json FILE]``. Needs ``clothsim``,
-``numpy`` and ``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA`` or
-``../shared/data``.
+Usage: ``python benches/compare_ipctk.py [--repeats N] [--scenes NAME ...] [--detect] [--json FILE]``. Needs
+``clothsim``, ``numpy`` and ``ipctk==1.6.1`` in one environment (``make compare``) and the data at ``$CLOTHSIM_DATA``
+or ``../shared/data``.
 
 What is timed, per scene, medians over the repeats, rounds interleaved so that all see the same machine:
 
@@ -89,8 +89,8 @@ def measure_intersections(
     note(f"ipctk has_intersections, {threads}", seconds(lambda: ipctk.has_intersections(mesh, columns)))
 
 
-def measure(scene: str, repeats: int) -> dict[str, list[float]]:
-    """Time everything on one scene."""
+def measure(scene: str, repeats: int, *, detect_only: bool) -> dict[str, list[float]]:
+    """Time everything, or only ``detect``, on one scene."""
     if scene in SHEETS:
         x0, triangles = sheet(scene)
         x1 = None
@@ -106,10 +106,13 @@ def measure(scene: str, repeats: int) -> dict[str, list[float]]:
 
     for _ in range(repeats):
         for threads in (1, 2):
-            measure_intersections(x0, triangles, mesh, threads, note)
+            if not detect_only:
+                measure_intersections(x0, triangles, mesh, threads, note)
             if x1 is None:
                 continue
             note(f"detect, {threads}", seconds(partial(cs.collision.detect, x0, x1, triangles, threads=threads)))
+            if detect_only:
+                continue
             ends = np.asfortranarray(x0), np.asfortranarray(x1)
             candidates = ipctk.Candidates()
             build = seconds(partial(candidates.build, mesh, *ends, 0.0, ipctk.LBVH()))
@@ -181,6 +184,7 @@ def main() -> None:
     parser.add_argument(
         "--scenes", nargs="*", default=["cloth-ball", *SHEETS], choices=both, metavar="NAME", help="frame pairs, sheets"
     )
+    parser.add_argument("--detect", action="store_true", help="only detect, without IPC Toolkit beside it")
     parser.add_argument("--json", type=Path, help="also write all times [s] to this file")
     options = parser.parse_args()
 
@@ -198,13 +202,13 @@ def main() -> None:
         ("ipctk has_intersections, 2", "self_intersections, 2"),
     ]
     for scene in options.scenes:
-        times = measure(scene, options.repeats)
+        times = measure(scene, options.repeats, detect_only=options.detect)
         report["scenes"][scene] = times  # type: ignore[index]
         print(f"{scene:<38}{'median':>9}{'least':>9}{'most':>9}")
         for name, values in times.items():
             print(f"  {name:<36}{statistics.median(values) * 1e3:9.1f}{min(values) * 1e3:9.1f}{max(values) * 1e3:9.1f}")
         for theirs, ours in pairs:
-            if ours not in times:
+            if ours not in times or theirs not in times:
                 continue
             ratio = statistics.median(times[theirs]) / statistics.median(times[ours])
             print(f"  {theirs} / {ours}: {ratio:.1f}")

@@ -100,7 +100,7 @@ pub struct Contacts {
 pub struct DetectStats {
     /// Pairs of tree nodes compared.
     pub broad_phase_tests: u64,
-    /// Pairs of leaves whose features were paired.
+    /// Pairs of leaves whose boxes overlap.
     pub leaf_pairs: u64,
     /// Admissible vertex-triangle pairs handed to the narrow phase.
     pub candidates_vertex_triangle: u64,

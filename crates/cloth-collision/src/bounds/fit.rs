@@ -50,38 +50,37 @@ mod avx {
         corners: &[[u32; LANES]; N],
         vertices: &[MovingBox<ENDS>],
     ) {
+        // Loops, no closures: what is not inlined here knows nothing of the vector instructions.
         let empty = MovingBox::EMPTY;
-        let boxes = corners.map(|corner| {
-            corner.map(|v| {
+        let mut boxes = [[std::ptr::null::<f32>(); LANES]; N];
+        for corner in 0..N {
+            for lane in 0..LANES {
+                let v = corners[corner][lane];
                 let bounds = if v == NONE { &empty } else { &vertices[v as usize] };
-                std::ptr::from_ref(bounds).cast::<f32>()
-            })
-        });
+                boxes[corner][lane] = std::ptr::from_ref(bounds).cast();
+            }
+        }
         let out = std::ptr::from_mut(block).cast::<f32>();
         let last_low = _mm256_set1_epi32(3 * ENDS as i32 - 1);
         let order = _mm256_setr_epi32(0, 1, 2, 3, 0, 1, 2, 3);
         // A box has 6 · ENDS coordinates, the low ones first; the last four of them may have been done in part before.
-        for first in [0, 4, 8].map(|first: usize| first.min(6 * ENDS - 4)).into_iter().take(ENDS + 1) {
+        for quarter in 0..=ENDS {
+            let first = (4 * quarter).min(6 * ENDS - 4);
             let is_high =
                 _mm256_cmpgt_epi32(_mm256_add_epi32(_mm256_set1_epi32(first as i32), order), last_low);
             let is_high = _mm256_castsi256_ps(is_high);
             let mut rows = [_mm256_setzero_ps(); 4];
             for lane in 0..LANES / 2 {
-                // Lanes `lane` and `lane` + 4.
-                let pair = |corner: usize| {
+                for corner in 0..N {
+                    // Lanes `lane` and `lane` + 4.
                     let [low, high] = [boxes[corner][lane], boxes[corner][lane + LANES / 2]];
                     // SAFETY: `repr(C)` boxes of 6 · ENDS coordinates, of which these are four.
                     let (low, high) =
                         unsafe { (_mm_loadu_ps(low.add(first)), _mm_loadu_ps(high.add(first))) };
-                    _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low), high)
-                };
-                let mut row = pair(0);
-                for corner in 1..N {
-                    let other = pair(corner);
-                    let (least, most) = (_mm256_min_ps(other, row), _mm256_max_ps(other, row));
-                    row = _mm256_blendv_ps(least, most, is_high);
+                    let both = _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(low), high);
+                    let (least, most) = (_mm256_min_ps(both, rows[lane]), _mm256_max_ps(both, rows[lane]));
+                    rows[lane] = if corner == 0 { both } else { _mm256_blendv_ps(least, most, is_high) };
                 }
-                rows[lane] = row;
             }
             let [a, b, c, d] = rows;
             let (ab_low, ab_high) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
@@ -92,9 +91,9 @@ mod avx {
                 _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
                 _mm256_shuffle_ps::<0xee>(ab_high, cd_high),
             ];
-            for (k, column) in columns.into_iter().enumerate() {
+            for k in 0..4 {
                 // SAFETY: a `repr(C)` block has as many lists of eight lanes as a box has coordinates, in their order.
-                unsafe { _mm256_storeu_ps(out.add(LANES * (first + k)), column) };
+                unsafe { _mm256_storeu_ps(out.add(LANES * (first + k)), columns[k]) };
             }
         }
     }

@@ -111,6 +111,7 @@ pub(crate) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::Threa
     // Triangles come body by body.
     let body_of = |item: &Item| mesh.vertex_body[mesh.triangles[item.triangle as usize][0] as usize];
     let mut leaf_count = 0;
+    let mut bodies: Vec<&[Item]> = vec![];
     for items in items.chunk_by_mut(|a, b| body_of(a) == body_of(b)) {
         match pool {
             Some(pool) if items.len() > PARALLEL => pool.install(|| arrange(items)),
@@ -119,9 +120,8 @@ pub(crate) fn build(mesh: &CollisionMesh, x: &[Vec3], pool: Option<&rayon::Threa
         let first = leaf_count;
         leaf_count += items.len().div_ceil(LEAF_TRIANGLES) as u32;
         levels.push((body_of(&items[0]), first..leaf_count));
+        bodies.push(items);
     }
-    // Within a body only: the triangles have changed their places there.
-    let bodies: Vec<&[Item]> = items.chunk_by(|a, b| body_of(a) == body_of(b)).collect();
     leaves::fill(mesh, &bodies, &mut tree, pool);
     while levels.iter().any(|(_, level)| level.len() > 1) {
         for (_, level) in &mut levels {

@@ -38,6 +38,10 @@ impl<'a> Deciding<'a> {
 
 impl<const ENDS: usize> Visit<ENDS> for Deciding<'_> {
     fn leaf_pair(&mut self, leaves: &LeafPairs<'_, ENDS>, a: u32, b: u32) {
+        let diagonals = &leaves.boxes.diagonals;
+        if a != b && !diagonals.is_empty() && diagonals[a as usize].are_apart(&diagonals[b as usize]) {
+            return;
+        }
         self.pairing.features(leaves.tree, leaves.boxes, a, b, &mut self.places);
         if self.places.vertex_triangle.len() + self.places.edge_edge.len() > FLUSH {
             self.narrow.take_places(leaves.tree, &mut self.places);

@@ -50,9 +50,22 @@ pub(super) fn fill(
         first_ranks.push(first_rank);
         first_rank += vertices;
     }
-    tree.triangle_ids = mapped(pool, LEAF_CHUNK, &items, |items| in_lanes(items, |t| t));
-    tree.corners = mapped(pool, LEAF_CHUNK, &items, |items| {
-        [0, 1, 2].map(|k| in_lanes(items, |t| mesh.triangles[t as usize][k]))
+    tree.triangle_ids = mapped(pool, LEAF_CHUNK, &items, |items| {
+        let mut ids = [NONE; LANES];
+        for (id, item) in ids.iter_mut().zip(*items) {
+            *id = item.triangle;
+        }
+        ids
+    });
+    tree.corners = mapped(pool, LEAF_CHUNK, &tree.triangle_ids, |ids| {
+        let mut corners = [[NONE; LANES]; 3];
+        for lane in 0..LANES {
+            let triangle = mesh.triangles.get(ids[lane] as usize).unwrap_or(&[NONE; 3]);
+            for k in 0..3 {
+                corners[k][lane] = triangle[k];
+            }
+        }
+        corners
     });
     if owned.is_empty() {
         return;
@@ -68,15 +81,23 @@ pub(super) fn fill(
     let parts = parts(tree, &items, &first_ranks);
     each(pool, parts, |part| part.fill(mesh, &mask, &ranks));
 
-    let rank = |v: u32| if v == NONE { NONE } else { ranks[v as usize].load(Ordering::Relaxed) };
-    tree.triangle_ranks = mapped(pool, LEAF_CHUNK, &tree.corners, |corners| -> [[u32; 3]; LANES] {
-        std::array::from_fn(|lane| [0, 1, 2].map(|k| rank(corners[k][lane])))
-    })
-    .into_flattened();
-    tree.edge_ranks = mapped(pool, LEAF_CHUNK, &tree.edge_ends, |ends| -> [[u32; 2]; LANES] {
-        std::array::from_fn(|lane| [0, 1].map(|k| rank(ends[k][lane])))
-    })
-    .into_flattened();
+    // Without a vertex, without a rank.
+    let rank = |v: u32| ranks.get(v as usize).map_or(NONE, |rank| rank.load(Ordering::Relaxed));
+    tree.triangle_ranks =
+        mapped(pool, LEAF_CHUNK, &tree.corners, |corners| by_lane(corners, rank)).into_flattened();
+    tree.edge_ranks = mapped(pool, LEAF_CHUNK, &tree.edge_ends, |ends| by_lane(ends, rank)).into_flattened();
+}
+
+/// The ranks of each lane's vertices.
+#[inline(always)]
+fn by_lane<const N: usize>(vertices: &[[u32; LANES]; N], rank: impl Fn(u32) -> u32) -> [[u32; N]; LANES] {
+    let mut ranks = [[NONE; N]; LANES];
+    for lane in 0..LANES {
+        for k in 0..N {
+            ranks[lane][k] = rank(vertices[k][lane]);
+        }
+    }
+    ranks
 }
 
 /// Bits of what a triangle owns: its corners, and its sides as [`CollisionMesh::triangle_edges`] has them.
@@ -97,10 +118,6 @@ fn owned(mesh: &CollisionMesh, pool: Option<&rayon::ThreadPool>) -> Vec<u8> {
         (first..).zip(both).map(of_triangle).collect()
     };
     mapped(pool, 1, &numbers, of_chunk).concat()
-}
-
-fn in_lanes(items: &[Item], of: impl Fn(u32) -> u32) -> [u32; LANES] {
-    std::array::from_fn(|lane| items.get(lane).map_or(NONE, |item| of(item.triangle)))
 }
 
 /// Some leaves in a row, and their part of the lists of features.

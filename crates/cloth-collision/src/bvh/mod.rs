@@ -1,11 +1,12 @@
 //! Bounding volume hierarchy of fixed topology over the scene's triangles.
 //!
 //! [`build`] splits once, into blocks of eight; [`refit`] follows the motion with boxes at both ends of the step;
-//! [`traverse`] meets the tree with itself, and [`places`] (for detection) or [`leaf_pair`] (for everything else) the features
+//! [`traverse`] meets the tree with itself, [`diagonals`] part leaves whose boxes overlap, and [`places`] (for detection) or [`leaf_pair`] (for everything else) the features
 //! of two leaves, each feature from the one triangle that owns it; [`narrow`] decides what they yield while it streams by.
 
 pub(crate) mod build;
 mod deciding;
+pub(crate) mod diagonals;
 mod flatness;
 mod intersections;
 pub(crate) mod leaf_pair;
@@ -22,6 +23,7 @@ use crate::contact::check_positions;
 use crate::{CollisionMesh, Contacts, DetectError, Detector, Mode, Query, Vec3};
 use build::Tree;
 use deciding::Deciding;
+use diagonals::Diagonals;
 use flatness::Flatness;
 use refit::Boxes;
 use std::time::Instant;
@@ -81,6 +83,7 @@ impl Bvh {
         self.tree.bytes()
             + Boxes::<2>::bytes(&self.tree, self.vertex_count)
             + Boxes::<1>::bytes(&self.tree, self.vertex_count)
+            + self.tree.leaves.len() * size_of::<Diagonals<2>>()
             + self.flatness.as_ref().map_or(0, Flatness::bytes)
     }
 
@@ -139,6 +142,7 @@ impl Detector for Bvh {
         let is_moving = query.mode == Mode::Continuous;
         if is_moving {
             self.refit_moving(mesh, query, pool);
+            self.moving.refit_diagonals(&self.tree, pool);
         } else {
             self.refit_still(mesh, query, pool);
         }

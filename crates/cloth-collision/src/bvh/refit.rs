@@ -1,6 +1,7 @@
 //! New boxes for the present positions: per vertex, per feature block, per block of the tree.
 
 use super::build::{Leaf, Tree};
+use super::diagonals::Diagonals;
 use crate::CollisionMesh;
 use crate::bounds::{Block, LANES, MovingBox, fit};
 use cloth_mesh::NONE;
@@ -18,6 +19,8 @@ pub(crate) struct Boxes<const ENDS: usize> {
     pub(crate) lanes: Vec<BlockLanes>,
     pub(crate) vertex_blocks: Vec<Block<ENDS>>,
     pub(crate) edge_blocks: Vec<Block<ENDS>>,
+    /// Of each leaf, or none where nobody asked for them.
+    pub(crate) diagonals: Vec<Diagonals<ENDS>>,
 }
 
 /// Bit per lane, and what is known of the whole block.
@@ -34,7 +37,7 @@ const VERTEX_CHUNK: usize = 4096;
 const BLOCK_CHUNK: usize = 256;
 
 impl<const ENDS: usize> Boxes<ENDS> {
-    /// Memory of the boxes over a tree \[B\].
+    /// Memory of the boxes over a tree, without the leaves' diagonals \[B\].
     pub(crate) fn bytes(tree: &Tree, vertex_count: usize) -> usize {
         let per_block = size_of::<Block<ENDS>>() + size_of::<MovingBox<ENDS>>() + size_of::<BlockLanes>();
         vertex_count * size_of::<MovingBox<ENDS>>()
@@ -54,8 +57,8 @@ impl<const ENDS: usize> Boxes<ENDS> {
         self.refit_blocks(tree, mesh, of_vertex, active, pool);
         let Self { vertices, vertex_blocks, edge_blocks, .. } = self;
         pool.install(|| {
-            refill(edge_blocks, &tree.edge_ends, |ends| fitted(ends, vertices));
-            refill(vertex_blocks, one_corner(&tree.vertex_ids), |corner| fitted(corner, vertices));
+            refit_all(edge_blocks, &tree.edge_ends, vertices);
+            refit_all(vertex_blocks, one_corner(&tree.vertex_ids), vertices);
         });
     }
 
@@ -68,13 +71,15 @@ impl<const ENDS: usize> Boxes<ENDS> {
         active: Option<&[bool]>,
         pool: &rayon::ThreadPool,
     ) {
-        let Self { vertices, blocks, hulls, lanes, .. } = self;
+        let Self { vertices, blocks, hulls, lanes, diagonals, .. } = self;
+        // Those of other positions.
+        diagonals.clear();
         pool.install(|| {
             vertices.clear();
             let all = (0..mesh.vertex_count).into_par_iter().with_min_len(VERTEX_CHUNK);
             vertices.par_extend(all.map(&of_vertex));
             blocks.reserve(tree.block_count().saturating_sub(blocks.len()));
-            refill(blocks, &tree.corners, |corners| fitted(corners, vertices));
+            refit_all(blocks, &tree.corners, vertices);
             hulls.reserve(tree.block_count().saturating_sub(hulls.len()));
             refill(hulls, blocks, Block::hull);
         });
@@ -92,6 +97,17 @@ impl<const ENDS: usize> Boxes<ENDS> {
         for k in 0..tree.inner.len() {
             self.refit_inner(tree, k);
         }
+    }
+
+    /// Fits the diagonals of the leaves to the boxes of the vertices.
+    pub(crate) fn refit_diagonals(&mut self, tree: &Tree, pool: &rayon::ThreadPool) {
+        let Self { vertices, diagonals, .. } = self;
+        pool.install(|| {
+            refill(diagonals, &tree.corners, |corners| {
+                let used = corners.as_flattened().iter().filter(|&&v| v != NONE);
+                Diagonals::around(used.map(|&v| &vertices[v as usize]))
+            });
+        });
     }
 
     /// Fits the boxes of the features of the leaves that `wanted` marks.
@@ -165,6 +181,21 @@ fn refill<T: Sync, U: Send>(list: &mut Vec<U>, of: &[T], value: impl Fn(&T) -> U
     list.par_extend(of.par_iter().with_min_len(BLOCK_CHUNK).map(value));
 }
 
+/// [`refill`] with the boxes of features, each block where it is to lie.
+fn refit_all<const ENDS: usize, const N: usize>(
+    blocks: &mut Vec<Block<ENDS>>,
+    corners: &[[[u32; LANES]; N]],
+    vertices: &[MovingBox<ENDS>],
+) {
+    blocks.clear();
+    blocks.reserve(corners.len());
+    let room = &mut blocks.spare_capacity_mut()[..corners.len()];
+    let both = room.par_iter_mut().zip(corners).with_min_len(BLOCK_CHUNK);
+    both.for_each(|(block, corners)| fit(block.write(Block::EMPTY), corners, vertices));
+    // SAFETY: there is room for so many, and each has been written.
+    unsafe { blocks.set_len(corners.len()) };
+}
+
 fn first_lanes(count: u32) -> u32 {
     (1 << count) - 1
 }
@@ -176,15 +207,4 @@ pub(crate) fn bits(lanes: [bool; LANES]) -> u32 {
 /// Features of one vertex.
 fn one_corner(ids: &[[u32; LANES]]) -> &[[[u32; LANES]; 1]] {
     ids.as_chunks::<1>().0
-}
-
-/// The boxes of a block's features.
-#[inline]
-fn fitted<const ENDS: usize, const N: usize>(
-    corners: &[[u32; LANES]; N],
-    vertices: &[MovingBox<ENDS>],
-) -> Block<ENDS> {
-    let mut block = Block::EMPTY;
-    fit(&mut block, corners, vertices);
-    block
 }

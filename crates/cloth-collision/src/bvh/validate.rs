@@ -98,6 +98,12 @@ impl<const ENDS: usize> Boxes<ENDS> {
                 }
             }
         }
+        for (leaf, diagonals) in self.diagonals.iter().enumerate() {
+            let vertices = tree.corners[leaf].as_flattened().iter().filter(|&&v| v != NONE);
+            if let Some(v) = vertices.clone().find(|&&v| !diagonals.hold(&self.vertices[v as usize])) {
+                return Err(format!("vertex {v} leaves the diagonals of leaf {leaf}"));
+            }
+        }
         for (leaf, ids) in tree.triangle_ids.iter().enumerate() {
             for (lane, &t) in ids.iter().enumerate().filter(|&(_, &t)| t != NONE) {
                 let bounds = self.blocks[leaf].get(lane);

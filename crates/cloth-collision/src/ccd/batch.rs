@@ -1,5 +1,5 @@
-//! Decides many pairs: two filters in single precision, then the march of those that they leave, whose first round asks the
-//! filter in double precision.
+//! Decides many pairs: two filters in single precision, then the march of those that they leave, whose answers the filter in
+//! double precision may overrule.
 
 use super::coarse;
 use super::edge_edge::EdgeEdgeMotion;
@@ -78,7 +78,7 @@ impl<P: Pairs + ?Sized> Kernel for Decide<'_, P> {
         let Self { kind, motions, pairs, batch } = self;
         batch.coarse_filter::<S, P>(kind, motions, pairs);
         let left = batch.numbers.len();
-        batch.second_filter::<S>(kind, motions);
+        batch.second_filter::<S, P>(kind, motions, pairs);
         // Where single precision tells few pairs apart, those that double precision does leave before the march.
         let is_blunt = batch.numbers.len() as f64 > MOST_LEFT * left as f64;
         if is_blunt {
@@ -102,7 +102,6 @@ impl<P: Pairs + ?Sized> Kernel for Decide<'_, P> {
     }
 }
 
-// Every pair is written, and the next one over it if it is apart: no branch on what is hard to foresee.
 impl Batch {
     /// Lists the pairs that [`coarse`] does not show to be apart.
     #[inline(always)]
@@ -112,32 +111,56 @@ impl Batch {
         motions: &Motions,
         pairs: &P,
     ) {
-        let Self { numbers, vertices, .. } = self;
-        let count = pairs.count();
-        numbers.clear();
-        numbers.resize(count, 0);
-        vertices.clear();
-        vertices.resize(count, [0; 4]);
-        let mut kept = 0;
-        let mut first = 0;
+        let (count, list) = (pairs.count(), &mut self.numbers);
+        list.clear();
+        // Room for whole groups behind those that are kept.
+        list.resize(count + MAX_SINGLES, 0);
+        let (mut kept, mut first) = (0, 0);
         let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
-        let mut group = [[0; 4]; MAX_SINGLES];
+        let mut numbers = [0; MAX_SINGLES];
         while first < count {
             let lanes = S::COUNT.min(count - first);
             for lane in 0..S::COUNT {
-                group[lane] = pairs.vertices(first + lane.min(lanes - 1));
-                rows[lane] = motions.small_rows(&group[lane]);
+                let number = first + lane.min(lanes - 1);
+                numbers[lane] = number as u32;
+                rows[lane] = motions.small_rows(&pairs.vertices(number));
             }
             let points = small_points::<S>(&rows);
-            let apart = coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT).bits();
-            for lane in 0..lanes {
-                (numbers[kept], vertices[kept]) = ((first + lane) as u32, group[lane]);
-                kept += (!apart >> lane & 1) as usize;
-            }
+            let apart = coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT);
+            kept += keep::<S>(!apart, lanes, &numbers, &mut list[kept..]);
             first += lanes;
         }
-        numbers.truncate(kept);
-        vertices.truncate(kept);
+        list.truncate(kept);
+    }
+
+    /// Keeps the pairs that more directions do not show to be apart, and lists their vertices.
+    #[inline(always)]
+    fn second_filter<S: Singles, P: Pairs + ?Sized>(
+        &mut self,
+        kind: StencilKind,
+        motions: &Motions,
+        pairs: &P,
+    ) {
+        let Self { numbers: list, vertices, .. } = self;
+        let (mut kept, mut first, count) = (0, 0, list.len());
+        list.resize(count + MAX_SINGLES, 0);
+        let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
+        while first < count {
+            let lanes = S::COUNT.min(count - first);
+            let mut numbers = [0; MAX_SINGLES];
+            numbers[..S::COUNT].copy_from_slice(&list[first..first + S::COUNT]);
+            for lane in 0..S::COUNT {
+                rows[lane] = motions.small_rows(&pairs.vertices(numbers[lane.min(lanes - 1)] as usize));
+            }
+            let points = small_points::<S>(&rows);
+            let apart = coarse::apart_by_more(kind, &points, motions.small_thickness, coarse::UNIT);
+            // What is written over has been read.
+            kept += keep::<S>(!apart, lanes, &numbers, &mut list[kept..]);
+            first += lanes;
+        }
+        list.truncate(kept);
+        vertices.clear();
+        vertices.extend(list.iter().map(|&number| pairs.vertices(number as usize)));
     }
 
     /// Keeps the pairs that [`filter`] does not show to be apart.
@@ -145,6 +168,7 @@ impl Batch {
     fn fine_filter<D: Doubles>(&mut self, kind: StencilKind, motions: &Motions) {
         let Self { numbers, vertices, .. } = self;
         let (mut kept, mut first) = (0, 0);
+        // Every pair is written, and the next one over it if it is apart: no branch on what is hard to foresee.
         while first < vertices.len() {
             let count = D::COUNT.min(vertices.len() - first);
             let rows = |place: u32| motions.rows(&vertices[place as usize]);
@@ -163,30 +187,15 @@ impl Batch {
         numbers.truncate(kept);
         vertices.truncate(kept);
     }
+}
 
-    /// Keeps the pairs that more directions do not show to be apart.
-    #[inline(always)]
-    fn second_filter<S: Singles>(&mut self, kind: StencilKind, motions: &Motions) {
-        let Self { numbers, vertices, .. } = self;
-        let (mut kept, mut first) = (0, 0);
-        while first < vertices.len() {
-            let lanes = S::COUNT.min(vertices.len() - first);
-            let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
-            for lane in 0..S::COUNT {
-                rows[lane] = motions.small_rows(&vertices[first + lane.min(lanes - 1)]);
-            }
-            let points = small_points(&rows);
-            let apart =
-                coarse::apart_by_more::<S>(kind, &points, motions.small_thickness, coarse::UNIT).bits();
-            for lane in 0..lanes {
-                (numbers[kept], vertices[kept]) = (numbers[first + lane], vertices[first + lane]);
-                kept += (!apart >> lane & 1) as usize;
-            }
-            first += lanes;
-        }
-        numbers.truncate(kept);
-        vertices.truncate(kept);
-    }
+/// Writes the numbers of the first `lanes` lanes that are set, in their order; what comes behind them has no meaning. Returns
+/// how many they are.
+#[inline(always)]
+fn keep<S: Singles>(set: S::Mask, lanes: usize, numbers: &[u32; MAX_SINGLES], out: &mut [u32]) -> usize {
+    let set = set.bits() & ((1 << lanes) - 1);
+    S::compress(set, numbers, out.first_chunk_mut().expect("room for a group"));
+    set.count_ones() as usize
 }
 
 static ORIGIN: SmallRow = [0.0; 8];

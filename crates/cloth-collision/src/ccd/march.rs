@@ -116,8 +116,9 @@ fn direction<L: Doubles, M: Motion<L, K>, const K: usize>(mut motion: M, t: L) -
     Answer { goes_on: moves & !is_apart, time }
 }
 
-/// Marches all `pairs` (their numbers; the list is used up) from t = 0 and leaves their times in `times`, by number. With
-/// `filters`, those that [`filter`] shows to be apart are not marched; returns how many the others are. All points are finite.
+/// Marches all pairs (as many as there are `times`; `pairs` are their numbers, and the list is used up) from t = 0 and leaves
+/// their times in `times`. With `filters`, those that [`filter`] shows to be apart are never in contact, whatever the march
+/// says; returns how many the others are. All points are finite.
 #[inline(always)]
 pub(crate) fn march<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
     rows: impl Fn(u32) -> Rows<'a>,
@@ -126,55 +127,82 @@ pub(crate) fn march<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
     pairs: &mut [u32],
     times: &mut [f64],
 ) -> usize {
-    for &pair in &*pairs {
-        times[pair as usize] = 0.0;
-    }
-    let mut count = pairs.len();
-    let (mut is_first, mut marched) = (true, 0);
+    times.fill(0.0);
+    let (mut count, mut marched) = (pairs.len(), pairs.len());
+    let mut is_first = true;
     // A loop over the questions, so that each is compiled once.
     for step in 0..2 * MAX_ROUNDS {
-        if count == 0 {
+        // Most pairs are found to be apart in the first round: the filter need not be asked about these.
+        if step == 2 && filters {
+            marched -= overrule::<L, M, K>(&rows, thickness, times);
+            count = keep(&mut pairs[..count], |pair| times[pair as usize] != NEVER);
+        }
+        if count == 0 && step >= 2 {
             break;
         }
         let question = if step % 2 == 0 { Question::Root } else { Question::Direction };
         if matches!(question, Question::Root) && thickness > 0.0 {
             continue;
         }
-        let first = if is_first { Some(First { filters }) } else { None };
-        let asked = ask::<L, M, K>(question, first, &rows, thickness, &mut pairs[..count], times);
-        count = asked.left;
-        if is_first {
-            marched = asked.marched;
-        }
+        count = ask::<L, M, K>(question, is_first, &rows, thickness, &mut pairs[..count], times);
         is_first = false;
     }
     marched
 }
 
-/// What the first round asks beside its question.
-#[derive(Debug, Clone, Copy)]
-struct First {
-    filters: bool,
+/// Keeps the pairs that are `wanted`, in their order, at the front; returns how many they are.
+#[inline(always)]
+fn keep(pairs: &mut [u32], wanted: impl Fn(u32) -> bool) -> usize {
+    let mut kept = 0;
+    for k in 0..pairs.len() {
+        let pair = pairs[k];
+        pairs[kept] = pair;
+        kept += usize::from(wanted(pair));
+    }
+    kept
 }
 
-/// How many pairs a round marched, and how many of them go on.
-struct Asked {
-    marched: usize,
-    left: usize,
+/// Takes back the times of the pairs that [`filter`] shows to be apart; returns how many they are.
+#[inline(always)]
+fn overrule<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
+    rows: &impl Fn(u32) -> Rows<'a>,
+    thickness: f64,
+    times: &mut [f64],
+) -> usize {
+    let (mut next, mut overruled) = (0, 0);
+    while next < times.len() {
+        let (mut group, mut count) = ([0; MAX_DOUBLES + 1], 0);
+        while next < times.len() && count < L::COUNT {
+            group[count] = next as u32;
+            count += usize::from(times[next] != NEVER);
+            next += 1;
+        }
+        if count == 0 {
+            break;
+        }
+        let apart = filter::apart::<L>(M::KIND, &points(rows, &group[..count]), thickness).bits();
+        for lane in 0..count {
+            if apart >> lane & 1 == 1 {
+                times[group[lane] as usize] = NEVER;
+                overruled += 1;
+            }
+        }
+    }
+    overruled
 }
 
-/// Asks all pairs, notes their times, and brings those that go on to the front. The first time it asks also the
-/// filter and what needs no time.
+/// Asks all pairs, notes their times, and brings those that go on to the front; returns how many they are. The first time
+/// it asks also what needs no time.
 #[inline(always)]
 fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
     question: Question,
-    first_round: Option<First>,
+    is_first: bool,
     rows: &impl Fn(u32) -> Rows<'a>,
     thickness: f64,
     pairs: &mut [u32],
     times: &mut [f64],
-) -> Asked {
-    let (mut kept, mut marched) = (0, 0);
+) -> usize {
+    let mut kept = 0;
     let mut first = 0;
     while first < pairs.len() {
         let count = L::COUNT.min(pairs.len() - first);
@@ -184,20 +212,7 @@ fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
             t[lane] = times[pairs[first + lane] as usize];
         }
         let (motion, t) = (M::new(&points, thickness), L::from_array(&t));
-        let before = if let Some(First { filters }) = first_round {
-            let Answer { mut goes_on, mut time } = start(&motion, t);
-            let mut left = (1 << count) - 1;
-            if filters {
-                let apart = filter::apart::<L>(M::KIND, &points, thickness);
-                left &= (!apart).bits();
-                time = L::select(apart, L::splat(NEVER), time);
-                goes_on = goes_on & !apart;
-            }
-            marched += left.count_ones() as usize;
-            Some(Answer { goes_on, time })
-        } else {
-            None
-        };
+        let before = if is_first { Some(start(&motion, t)) } else { None };
         let Answer { mut goes_on, mut time } = match question {
             Question::Root => root(motion, t),
             Question::Direction => direction(motion, t),
@@ -215,7 +230,7 @@ fn ask<'a, L: Doubles, M: Motion<L, K>, const K: usize>(
         }
         first += count;
     }
-    Asked { marched, left: kept }
+    kept
 }
 
 /// The points of a group of at least one pair and at most as many as there are lanes; further lanes repeat the last one.

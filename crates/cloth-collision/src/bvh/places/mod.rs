@@ -66,9 +66,12 @@ pub(crate) struct Places {
     pub(crate) edge_edge: PlacePairs,
 }
 
-/// What pairs features by their places.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Pairing {
+/// What pairs features by their places. A value exists only where the processor has its instructions.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pairing(Kind);
+
+#[derive(Debug, Clone, Copy)]
+enum Kind {
     Plain,
     #[cfg(target_arch = "x86_64")]
     Avx2,
@@ -78,17 +81,47 @@ pub(crate) enum Pairing {
 }
 
 impl Pairing {
-    #[cfg(test)]
-    const KNOWN: &[Self] = &[
-        Self::Plain,
-        #[cfg(target_arch = "x86_64")]
-        Self::Avx2,
-        #[cfg(target_arch = "x86_64")]
-        Self::Avx512,
-    ];
+    /// Those that this processor has the instructions for, the fastest first.
+    fn there() -> impl Iterator<Item = Self> {
+        let kinds = [
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512,
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2,
+            Kind::Plain,
+        ];
+        kinds.into_iter().filter(|kind| kind.is_there()).map(Self)
+    }
 
-    /// Whether this processor has the instructions.
+    /// The fastest of this processor.
+    pub(crate) fn fastest() -> Self {
+        Self::there().next().unwrap_or(Self(Kind::Plain))
+    }
+
+    /// Appends the pairs of features of the leaves `a` and `b` (once each if they are equal) that share no vertex and whose
+    /// boxes overlap.
     #[inline]
+    pub(crate) fn features<const ENDS: usize>(
+        self,
+        tree: &Tree,
+        boxes: &Boxes<ENDS>,
+        a: u32,
+        b: u32,
+        out: &mut Places,
+    ) {
+        match self.0 {
+            Kind::Plain => features_with(tree, boxes, a, b, out, Plain),
+            // SAFETY: the processor has AVX2.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx2 => unsafe { features_avx2(tree, boxes, a, b, out) },
+            // SAFETY: the processor has the instructions.
+            #[cfg(target_arch = "x86_64")]
+            Kind::Avx512 => unsafe { avx512::features(tree, boxes, a, b, out) },
+        }
+    }
+}
+
+impl Kind {
     fn is_there(self) -> bool {
         match self {
             Self::Plain => true,
@@ -102,44 +135,6 @@ impl Pairing {
                     && std::arch::is_x86_feature_detected!("bmi2")
                     && std::arch::is_x86_feature_detected!("popcnt")
             }
-        }
-    }
-
-    /// The fastest of this processor.
-    #[inline]
-    pub(crate) fn fastest() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        for wide in [Self::Avx512, Self::Avx2] {
-            if wide.is_there() {
-                return wide;
-            }
-        }
-        Self::Plain
-    }
-
-    /// Appends the pairs of features of the leaves `a` and `b` (once each if they are equal) that share no vertex and whose
-    /// boxes overlap.
-    ///
-    /// # Panics
-    /// If this processor does not have the instructions.
-    #[inline]
-    pub(crate) fn features<const ENDS: usize>(
-        self,
-        tree: &Tree,
-        boxes: &Boxes<ENDS>,
-        a: u32,
-        b: u32,
-        out: &mut Places,
-    ) {
-        assert!(self.is_there(), "no {self:?} in this processor");
-        match self {
-            Self::Plain => features_with(tree, boxes, a, b, out, Plain),
-            // SAFETY: the processor has AVX2.
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => unsafe { features_avx2(tree, boxes, a, b, out) },
-            // SAFETY: the processor has the instructions.
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => unsafe { avx512::features(tree, boxes, a, b, out) },
         }
     }
 }

@@ -72,7 +72,7 @@ fn fitted(count: u32) -> Bvh {
 fn places_name_the_pairs_that_numbers_name() {
     for count in [1, 7, 8, 9, 40, 333] {
         let bvh = fitted(count);
-        for &pairing in Pairing::KNOWN.iter().filter(|p| p.is_there()) {
+        for pairing in Pairing::there() {
             let [by_place, by_number] = pairs(&bvh, pairing);
             assert!(by_place == by_number, "{pairing:?}, {count} triangles");
             if count == 333 {
@@ -85,7 +85,7 @@ fn places_name_the_pairs_that_numbers_name() {
 
 #[test]
 fn a_box_too_small_is_seen() {
-    for &pairing in Pairing::KNOWN.iter().filter(|p| p.is_there()) {
+    for pairing in Pairing::there() {
         let mut bvh = fitted(40);
         let [whole, _] = pairs(&bvh, pairing);
         for block in &mut bvh.moving.edge_blocks {

@@ -179,6 +179,16 @@ impl Singles for Sixteen {
     const COUNT: usize = 16;
 
     #[inline(always)]
+    fn compress(set: u32, entries: &[u32; MAX_SINGLES], out: &mut [u32; MAX_SINGLES]) {
+        // SAFETY: see above; 64 bytes to read and to write.
+        unsafe {
+            let entries = arch::_mm512_loadu_si512(entries.as_ptr().cast());
+            let kept = arch::_mm512_maskz_compress_epi32(set as u16, entries);
+            arch::_mm512_storeu_si512(out.as_mut_ptr().cast(), kept);
+        }
+    }
+
+    #[inline(always)]
     fn gather(rows: &[[&SmallRow; 4]; MAX_SINGLES], k: usize) -> [Vector<Self>; 2] {
         // SAFETY: see above; 32 readable bytes in each row.
         unsafe {

@@ -72,6 +72,16 @@ pub(crate) trait Singles: Lanes {
     const COUNT: usize;
     /// Entries of row `k` of the first lanes: the point at t0 and at t1.
     fn gather(rows: &[[&SmallRow; 4]; MAX_SINGLES], k: usize) -> [Vector<Self>; 2];
+    /// Writes the entries of the lanes whose bit is set, in their order; what comes behind them has no meaning.
+    #[inline(always)]
+    fn compress(set: u32, entries: &[u32; MAX_SINGLES], out: &mut [u32; MAX_SINGLES]) {
+        // Every entry is written, and the next one over it if its bit is not set: no branch on what is hard to foresee.
+        let mut kept = 0;
+        for lane in 0..Self::COUNT {
+            out[kept] = entries[lane];
+            kept += (set >> lane & 1) as usize;
+        }
+    }
 }
 
 impl Singles for f32 {
