@@ -6,7 +6,8 @@ use crate::{
     forces::{
         ForceModel,
         coupled::Plate,
-        hinge::{Hinges, Rest, dihedral_angle},
+        dihedral::{Rest, dihedral_angle},
+        hinge::Hinges,
         spring::{Role, Springs},
         stretch_shear::{Stiffness, StretchShear},
     },

@@ -20,7 +20,7 @@
 
 use nalgebra::{Matrix3, SymmetricEigen};
 
-use super::hinge::Rest;
+use super::dihedral::Rest;
 use crate::mesh::NONE;
 
 /// The hinges of a triangle and its rest geometry.
@@ -185,7 +185,7 @@ mod tests {
             corners.push([a, b, hinge.opposite[0], hinge.opposite[1]]);
             let x = corners[k].map(|v| mesh.vertices[v as usize]);
             let areas = hinge.triangles.map(|t| shape.area[t as usize]);
-            rest.push(Rest::new((x[1] - x[0]).norm(), areas, super::super::hinge::dihedral_angle(&x)));
+            rest.push(Rest::new((x[1] - x[0]).norm(), areas, super::super::dihedral::dihedral_angle(&x)));
             let edge = topology.edges.iter().position(|e| *e == [a.min(b), a.max(b)]).unwrap();
             hinge_of[edge] = k as u32;
         }

@@ -2,10 +2,8 @@
 //!
 //! E = Σ |e| h̄ Ψ(K)   [J],   K = (θ − θ_0)/h̄   [1/m],   Ψ' = M
 //!
-//! Corners 0, 1 are the shared edge, 2 and 3 the opposite vertices; e = x_1 − x_0, l_0 = x_2 − x_0, l_1 = x_3 − x_0,
-//! n_0 = e × l_0, n_1 = l_1 × e. θ = atan2((n_0 × n_1)·ê, n_0·n_1) ∈ [−π, π] is zero when flat and ±π when folded flat;
-//! θ_0 its value in the mesh as it came; |e| the rest length of the edge [m]; h̄ the mean of the two rest heights over it
-//! [m]; M(K) the moment per width [N] of a [`BendingLaw`]. The linear law M = B K with the rigidity B [N m] has
+//! θ is the angle of [`super::dihedral`], θ_0 its value in the mesh as it came; |e| the rest length of the shared edge [m];
+//! h̄ the mean of the two rest heights over it [m]; M(K) the moment per width [N] of a [`BendingLaw`]. The linear law M = B K with the rigidity B [N m] has
 //! E = |e| B (θ − θ_0)²/(2 h̄) and makes B the rigidity that a textile laboratory measures.
 //!
 //! Angles of laws with memory go on past ±π: of the angles that differ by 2π, the one next to what is remembered counts.
@@ -13,9 +11,7 @@
 //! places do, and the angle next to the one at rest counts: the same but for a hinge that turns from less than [`OPEN`] to past ±π
 //! within one step.
 //!
-//! Torque |e| M, force −|e| M dθ/dx with the exact gradient (t_i = l_i·e/|e|²):
-//! dθ/dx_2 = −|e| n_0/|n_0|², dθ/dx_3 = −|e| n_1/|n_1|², dθ/dx_0 = −(1 − t_0) dθ/dx_2 − (1 − t_1) dθ/dx_3,
-//! dθ/dx_1 = −t_0 dθ/dx_2 − t_1 dθ/dx_3: forces and moments sum to zero.
+//! Torque |e| M, force −|e| M dθ/dx with the exact gradient: forces and moments sum to zero.
 //!
 //! Damping (3.8): torque |e| D θ̇/h̄ with the law's damping D [N m s].
 //!
@@ -24,9 +20,6 @@
 //! Friction and flow stay with each hinge: E_c is the energy of its torque but where the plastic law flows within a step, and a
 //! rest angle that moves takes its part of E_c along. An evaluation takes two passes: the angles of all hinges, then the forces. The
 //! tangent takes E_c by its bound.
-//!
-//! A triangle flatter than 10⁻⁴ of its rest area has its gradient scaled down to zero with its normal, so forces stay
-//! finite; there the force is no longer the exact gradient of E.
 //!
 //! Sources: thesis (3.9), (3.28), (3.29) with atan2 and mesh-independent weights; Pabst et al. 2008 for K.
 
@@ -41,6 +34,7 @@ mod places;
 use super::{
     CouplingKind, Couplings, ForceModel, Psd, Survey,
     coupled::{Coupled, Plate},
+    dihedral::{Rest, dihedral_angle},
     memory::{Memory, Past, PastMut},
 };
 use crate::{
@@ -50,9 +44,6 @@ use crate::{
     mesh::Vec3,
 };
 use places::{All, Few, Growing, Places, PlacesMut};
-
-/// Area relative to rest under which a triangle's normal no longer gives a full gradient.
-const COLLAPSED: f64 = 1e-4;
 
 /// Hinges whose angles are computed before their laws.
 const BLOCK: usize = 32;
@@ -71,34 +62,6 @@ pub(crate) struct Hinges<L: BendingLaw> {
     coupled: Option<Coupled>,
     /// Of hinges that remember only beyond the elastic range: what may be neglected there, see [`BendingLaw::leaves`].
     lean: Option<f64>,
-}
-
-/// Rest data of one hinge.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Rest {
-    /// Length of the shared edge [m].
-    pub(crate) edge: f64,
-    /// Mean height of the two triangles over it [m].
-    pub(crate) height: f64,
-    /// Angle in the undeformed state [rad].
-    pub(crate) angle: f64,
-    /// Least |n|² that gives a full gradient, per triangle [m⁴].
-    floor: [f64; 2],
-}
-
-impl Rest {
-    /// From the edge's rest length [m], the two rest areas [m²] and the rest angle [rad].
-    pub(crate) fn new(edge: f64, areas: [f64; 2], angle: f64) -> Self {
-        let floor = areas.map(|a| (2.0 * COLLAPSED * a).powi(2));
-        Self { edge, height: (areas[0] + areas[1]) / edge, angle, floor }
-    }
-}
-
-/// Angle and its gradient at one state.
-#[derive(Clone, Copy)]
-struct Angle {
-    value: f64,
-    gradient: [Vec3; 4],
 }
 
 /// Numbers as places; none for laws without memory.
@@ -142,14 +105,6 @@ macro_rules! with_places_mut {
             }
         }
     };
-}
-
-/// Signed dihedral angle [rad] of corners (e0, e1, opposite, opposite).
-pub(crate) fn dihedral_angle(x: &[Vec3; 4]) -> f64 {
-    let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
-    let (n0, n1) = (e.cross(&l0), l1.cross(&e));
-    // (n_0 × n_1)·ê = −|e| n_0·l_1, exact in sign even when folded flat.
-    (-e.norm() * n0.dot(&l1)).atan2(n0.dot(&n1))
 }
 
 impl<L: BendingLaw> Hinges<L> {
@@ -196,36 +151,6 @@ impl<L: BendingLaw> Hinges<L> {
     #[inline]
     fn corners_of(&self, element: usize, x: &[Vec3]) -> [Vec3; 4] {
         self.vertices[element].map(|i| x[i as usize])
-    }
-
-    /// dθ/dx of the corners.
-    #[inline(always)]
-    fn gradient(rest: &Rest, x: &[Vec3; 4]) -> [Vec3; 4] {
-        let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
-        let (n0, n1) = (e.cross(&l0), l1.cross(&e));
-        let e2 = e.norm_squared();
-        Self::gradient_of(rest, [e, l0, l1, n0, n1], e2, e2.sqrt())
-    }
-
-    #[inline(always)]
-    fn gradient_of(rest: &Rest, [e, l0, l1, n0, n1]: [Vec3; 5], e2: f64, length: f64) -> [Vec3; 4] {
-        let g2 = n0 * (-length / n0.norm_squared().max(rest.floor[0]));
-        let g3 = n1 * (-length / n1.norm_squared().max(rest.floor[1]));
-        let inverse = 1.0 / e2.max(rest.edge * rest.edge * COLLAPSED * COLLAPSED);
-        let (t0, t1) = (l0.dot(&e) * inverse, l1.dot(&e) * inverse);
-        let g1 = -(g2 * t0 + g3 * t1);
-        let g0 = -(g1 + g2 + g3);
-        [g0, g1, g2, g3]
-    }
-
-    #[inline(always)]
-    fn angle(rest: &Rest, x: &[Vec3; 4]) -> Angle {
-        let (e, l0, l1) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
-        let (n0, n1) = (e.cross(&l0), l1.cross(&e));
-        let e2 = e.norm_squared();
-        let length = e2.sqrt();
-        let value = (-length * n0.dot(&l1)).atan2(n0.dot(&n1));
-        Angle { value, gradient: Self::gradient_of(rest, [e, l0, l1, n0, n1], e2, length) }
     }
 
     /// What the law answers at a curvature; `None`: at a place without history.

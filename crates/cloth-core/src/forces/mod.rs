@@ -13,6 +13,7 @@
 
 pub(crate) mod air;
 pub(crate) mod coupled;
+pub(crate) mod dihedral;
 pub(crate) mod hinge;
 pub(crate) mod memory;
 pub(crate) mod spring;

@@ -1,12 +1,15 @@
 //! The passes over a range of hinges, one kernel per law and way of keeping its memory.
 
 use super::{
-    Angle, BLOCK, Hinges, dihedral_angle,
+    BLOCK, Hinges,
     places::{Places, PlacesMut},
 };
 use crate::{
     bending::BendingLaw,
-    forces::{Block, Linear, Outer, Survey},
+    forces::{
+        Block, Linear, Outer, Survey,
+        dihedral::{Angle, dihedral_angle},
+    },
     mesh::Vec3,
 };
 use std::ops::Range;
@@ -67,9 +70,9 @@ impl<L: BendingLaw> Hinges<L> {
             let corners = self.corners_of(element, x);
             let (curvature, gradient, neighbours) = if self.coupled.is_some() {
                 let neighbours = self.neighbour_torque(element, survey.elastic);
-                (survey.work[k], Self::gradient(rest, &corners), neighbours)
+                (survey.work[k], rest.gradient(&corners), neighbours)
             } else {
-                let Angle { value, gradient } = Self::angle(rest, &corners);
+                let Angle { value, gradient } = rest.angle(&corners);
                 (Self::curvature(rest, place.as_ref(), value), gradient, 0.0)
             };
             let moment = self.answer(place.as_ref(), curvature, 0.0).moment;
@@ -157,8 +160,7 @@ impl<L: BendingLaw> Hinges<L> {
             let (mut angles, mut rates) = ([0.0; BLOCK], [0.0; BLOCK]);
             for (k, outer) in outer.iter_mut().enumerate() {
                 let element = first + block * BLOCK + k;
-                let Angle { value, gradient } =
-                    Self::angle(&self.rest[element], &self.corners_of(element, x));
+                let Angle { value, gradient } = self.rest[element].angle(&self.corners_of(element, x));
                 let [v0, v1, v2, v3] = self.corners_of(element, v);
                 // Σ g_a = 0, so the rate needs differences only.
                 rates[k] =
