@@ -16,15 +16,14 @@ from unittest import mock
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from clothsim import _core
-from clothsim._toml import tomllib
+from clothsim import _core, _toml
 from clothsim.errors import InvalidScene
 from fuzz.mutations import JUNK, damaged, damaged_tree, edits, tree_edits
 from fuzz.target import File, Target, refused
 
 _ROOT = Path(__file__).resolve().parents[2]
 _EXAMPLES = [path.read_bytes() for path in sorted((_ROOT / "examples").glob("*.toml"))]
-_TREES = [tomllib.loads(content.decode()) for content in _EXAMPLES]
+_TREES = [_toml.loads(content.decode()) for content in _EXAMPLES]
 
 
 def target() -> Target:

@@ -20,9 +20,8 @@ from unittest import mock
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from clothsim import _core
+from clothsim import _core, _toml
 from clothsim._cli import sweep as command
-from clothsim._toml import tomllib
 from clothsim.errors import InvalidInput, InvalidScene
 from clothsim.sweep import draws, request, tables
 from clothsim.sweep.file import read as read_sweep
@@ -36,7 +35,7 @@ __all__ = ["target"]
 
 _ROOT = Path(__file__).resolve().parents[2]
 _EXAMPLE = (_ROOT / "examples" / "sweep.toml").read_bytes()
-_SCENE = tomllib.loads(_EXAMPLE.decode())["scene"]
+_SCENE = _toml.loads(_EXAMPLE.decode())["scene"]
 # What a sweep may make here, so that a case takes seconds at most; the bound of the product is the same code.
 _MOST_RUNS = 300
 
@@ -80,12 +79,16 @@ _DRAW = st.one_of(
 )  # fmt: skip
 
 
-def _mostly(value: Any, other: SearchStrategy[Any]) -> SearchStrategy[Any]:
-    return st.integers(0, 5).flatmap(lambda k: other if k == 5 else st.just(value))
-
-
 def _sweeps() -> SearchStrategy[dict[str, Any]]:
-    """Tables of sweeps, most of their parts in order."""
+    """Tables of sweeps: one in order, with up to four of its parts drawn."""
+    bounds = st.builds(
+        lambda kind, numbers: {kind: numbers},
+        st.sampled_from([*draws.KINDS]),
+        st.lists(_NUMBERS, min_size=2, max_size=2),
+    )
+    drawn = st.dictionaries(
+        st.sampled_from(["friction", "air.damping", "dt"]), st.one_of(bounds, bounds, _DRAW), min_size=1, max_size=2
+    )
     seeds = st.fixed_dictionaries(
         {"count": st.one_of(st.integers(1, 4), st.integers(1, 4), _NUMBERS)},
         optional={
@@ -95,24 +98,24 @@ def _sweeps() -> SearchStrategy[dict[str, Any]]:
     )  # fmt: skip
     names = st.lists(st.sampled_from(["lowest", "drape", "energy_drift", "energy", "contacts", "counts", "npz", "usd",
                                       "hausdorff", "lowst", "", "z" * 3000]), max_size=3)  # fmt: skip
-    return st.fixed_dictionaries(
-        {"scene": _mostly(_SCENE, st.one_of(
-            st.sampled_from(["scene.toml", ["scene.toml", "scene.toml"], ["scene.toml", "other.toml"], "none.toml", ".",
-                             "\0", "w" * 3000, [], [3]]), _VALUES))},
-        optional={
-            "vary": st.dictionaries(_NAMES, st.one_of(st.lists(_VALUES, max_size=4), _ROW, _VALUES), max_size=3),
-            "seeds": _mostly({"count": 2}, seeds), "set": st.dictionaries(_NAMES, _VALUES, max_size=2),
-            "combine": st.sampled_from(["product", "zip", "zpi", 3]), "name": st.one_of(st.text(max_size=5), _VALUES),
-            "metrics": names, "series": names, "keep": names, "timeout": _NUMBERS, "retries": _NUMBERS,
-            "threads": _NUMBERS, "device": st.sampled_from(["cpu", "auto", "gpu", "tpu", 1]),
-            "checkpoint_interval": _NUMBERS, "varry": st.just({}), "q" * 3000: st.just(1),
-        },
-    )  # fmt: skip
+    parts: dict[str, SearchStrategy[Any]] = {
+        "scene": st.one_of(st.sampled_from(["scene.toml", ["scene.toml", "scene.toml"], ["scene.toml", "other.toml"],
+                                            "none.toml", ".", "\0", "w" * 3000, [], [3]]), _VALUES),
+        "vary": st.dictionaries(_NAMES, st.one_of(st.lists(_VALUES, max_size=4), _ROW, _VALUES), max_size=3),
+        "seeds": st.one_of(*[st.builds(lambda draw: {"count": 2, "draw": draw}, drawn)] * 3, seeds),
+        "set": st.dictionaries(_NAMES, _VALUES, max_size=2),
+        "combine": st.sampled_from(["product", "zip", "zpi", 3]), "name": st.one_of(st.text(max_size=5), _VALUES),
+        "metrics": names, "series": names, "keep": names, "timeout": _NUMBERS, "retries": _NUMBERS,
+        "threads": _NUMBERS, "device": st.sampled_from(["cpu", "auto", "gpu", "tpu", 1]),
+        "checkpoint_interval": _NUMBERS, "varry": st.just({}), "q" * 3000: st.just(1),
+    }  # fmt: skip
+    part = st.one_of([st.tuples(st.just(name), values) for name, values in parts.items()])
+    return st.lists(part, max_size=4).map(lambda drawn: {"scene": _SCENE, "seeds": {"count": 2}, **dict(drawn)})
 
 
 def target() -> Target:
     """Sweep files."""
-    tree = tomllib.loads(_EXAMPLE.decode())
+    tree = _toml.loads(_EXAMPLE.decode())
     made = st.one_of(_sweeps(), st.builds(damaged_tree, st.one_of(st.just(tree), _sweeps()), tree_edits(3)))
     tables_of = made.filter(lambda one: isinstance(one, dict))
     return Target(

@@ -11,9 +11,35 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from clothsim.errors import OutputError, OutputExists
+from clothsim.errors import InvalidInput, OutputError, OutputExists
 
-__all__ = ["output_error", "remove_parts", "replacing", "whole", "whole_folder", "write_whole"]
+__all__ = ["output_error", "path_from", "remove_parts", "replacing", "whole", "whole_folder", "write_whole"]
+
+
+def path_from(path: str | os.PathLike[str], parameter: str = "path") -> Path:
+    """Give the path that the argument ``parameter`` names.
+
+    Raises
+    ------
+    InvalidInput
+        No file can have that name: it has a NUL character, or one that is none by itself (half of a surrogate pair).
+    TypeError
+        It is no path.
+    """
+    try:
+        given = Path(path)
+        possible = b"\0" not in os.fsencode(given)
+    except UnicodeEncodeError:
+        possible = False
+    except TypeError as error:
+        raise TypeError(f"{parameter}: expected a path, got {type(path).__name__}") from error
+    if not possible:
+        expected = "a path that the file system can have"
+        raise InvalidInput(
+            f"{parameter}: expected {expected}, got {str(given)!a}",
+            name=parameter, expected=expected, got=ascii(str(given)),
+        )  # fmt: skip
+    return given
 
 
 @contextlib.contextmanager

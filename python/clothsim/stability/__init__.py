@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from clothsim._files import path_from
 
 if TYPE_CHECKING:
     from clothsim.stability.atlas import Atlas
@@ -77,8 +78,9 @@ def run(
     from clothsim.stability.atlas import Request
 
     request = Request(cases, quick=quick, at=at, fixed=fixed)
+    folder = None if out is None else path_from(out, "out")
     done = job.run(
-        request, None if out is None else Path(out), resume=resume, overwrite=overwrite, processes=processes,
+        request, folder, resume=resume, overwrite=overwrite, processes=processes,
         limit=limit, progress=progress,
     )  # fmt: skip
     if isinstance(done, dict):

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from clothsim._files import path_from
 
 if TYPE_CHECKING:
     from clothsim.scene import Scene
@@ -124,7 +125,7 @@ def run(
         scene, vary, metric, fixed=fixed, reference=reference, cost=cost, sample=sample, seeds=seeds, seed=seed,
         disturbance=disturbance, repeats=repeats, patience=patience,
     )  # fmt: skip
-    folder = None if out is None else Path(out)
+    folder = None if out is None else path_from(out, "out")
     done = job.run(
         request, folder, resume=resume, overwrite=overwrite, processes=processes, limit=limit, progress=progress
     )
@@ -198,5 +199,5 @@ def tune(
     return tuning.tune(
         scene, tuning.Goal(error, budget, per), metric=metric, vary=axes, fixed=dict(fixed or {}), reference=reference,
         cost=cost, repeats=repeats, patience=patience, processes=processes, limit=limit, progress=progress,
-        out=None if out is None else Path(out), resume=resume, overwrite=overwrite, command=command,
+        out=None if out is None else path_from(out, "out"), resume=resume, overwrite=overwrite, command=command,
     )  # fmt: skip

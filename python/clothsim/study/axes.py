@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from clothsim import _toml
 from clothsim._nearest import hint
-from clothsim._toml import tomllib
 from clothsim.errors import InvalidInput
 from clothsim.scene import Scene
 from clothsim.study.resolution import set_resolution
@@ -195,8 +195,8 @@ def _split(text: str) -> list[str]:
 
 def _value(text: str) -> Any:
     try:
-        return tomllib.loads(f"v = {text}")["v"]
-    except tomllib.TOMLDecodeError:
+        return _toml.loads(f"v = {text}")["v"]
+    except (ValueError, RecursionError):
         pass
     try:
         return float(text)  # 1e-3 is TOML, .5 is not

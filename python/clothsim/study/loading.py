@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+from clothsim._files import path_from
 from clothsim.errors import InvalidInput
 from clothsim.study import evaluate
 from clothsim.study.axes import axis
@@ -26,14 +26,15 @@ def load(folder: str | os.PathLike[str]) -> Study:
     InvalidInput
         There is none, or it is damaged.
     """
-    path = Path(folder) / "study.json"
+    where = path_from(folder, "folder")
+    path = where / "study.json"
     try:
         facts = json.loads(path.read_bytes())
         made = Study(
             facts["name"], [axis(a["name"], a["values"]) for a in facts["axes"]], facts["fixed"],
             metrics([m["name"] for m in facts["metrics"]]), facts["cost"], [_row(row) for row in facts["rows"]],
             [(r["problem"], _reference(r)) for r in facts["references"]], facts["front"], [], facts["converged"],
-            facts["statement"], facts["machine"], facts["command"], facts["digest"], facts["duration"], Path(folder),
+            facts["statement"], facts["machine"], facts["command"], facts["digest"], facts["duration"], where,
             seconds=facts["seconds"], per_point=facts["runs_per_point"],
         )  # fmt: skip
     except (OSError, ValueError, KeyError, TypeError) as error:

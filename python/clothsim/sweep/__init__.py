@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from clothsim._files import path_from
 
 if TYPE_CHECKING:
     from clothsim.scene import Scene
@@ -46,7 +47,7 @@ def load(folder: str | os.PathLike[str]) -> Sweep:
     """
     from clothsim.sweep.job import load as read
 
-    return read(Path(folder))
+    return read(path_from(folder, "folder"))
 
 
 def run(
@@ -179,6 +180,6 @@ def run_file(
 def _run(request: Request, out: str | os.PathLike[str] | None, **options: Any) -> Sweep:
     from clothsim.sweep import job
 
-    folder = None if out is None else Path(out)
+    folder = None if out is None else path_from(out, "out")
     done = job.run(request, folder, job.Options(**options))
     return job.load(folder) if isinstance(done, dict) and folder is not None else done  # type: ignore[return-value]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -66,16 +67,17 @@ def draw(name: str, table: Any) -> Draw:
     InvalidInput
         The name is no key of a scene, or there is no such distribution; the nearest is named.
     """
+    parameter = name or "draw"
     expected = "one distribution: " + ", ".join(f"{kind} = [{what}]" for kind, what in KINDS.items())
     if not isinstance(table, Mapping) or len(table) != 1:
-        raise InvalidInput(f"draw {name}: expected {expected}, got {table!r}", name=name, expected=expected)
+        raise InvalidInput(f"draw {name}: expected {expected}, got {table!r}", name=parameter, expected=expected)
     kind, values = next(iter(table.items()))
     if kind not in KINDS:
         raise InvalidInput(
-            f'draw {name}: expected {expected}, got "{kind}"{hint(kind, KINDS)}', name=name, got=str(kind)
+            f'draw {name}: expected {expected}, got "{kind}"{hint(kind, KINDS)}', name=parameter, got=str(kind)
         )
     if isinstance(values, str) or not isinstance(values, Sequence) or not values:
-        raise InvalidInput(f"draw {name}: {kind} takes a list of {KINDS[kind]}, got {values!r}", name=name)
+        raise InvalidInput(f"draw {name}: {kind} takes a list of {KINDS[kind]}, got {values!r}", name=parameter)
     if kind != "choice":
         _check_numbers(name, kind, values)
     key = axis(name, [0]).key
@@ -85,9 +87,11 @@ def draw(name: str, table: Any) -> Draw:
 def _check_numbers(name: str, kind: str, values: Sequence[Any]) -> None:
     types = (int,) if kind == "integers" else (int, float)
     good = len(values) == 2 and all(isinstance(v, types) and not isinstance(v, bool) for v in values)
-    if good and all(math.isfinite(v) for v in values):
+    if good and all(abs(v) <= sys.float_info.max for v in values):
         first, second = values
         ordered = second >= 0 if kind == "normal" else first <= second
         if ordered and (kind != "log_uniform" or first > 0):
             return
-    raise InvalidInput(f"draw {name}: {kind} takes {KINDS[kind]}, got {list(values)}", name=name, got=str(values))
+    raise InvalidInput(
+        f"draw {name}: {kind} takes {KINDS[kind]}, got {list(values)}", name=name or "draw", got=str(values)
+    )

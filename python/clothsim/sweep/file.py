@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clothsim import _core
+from clothsim import _core, _toml
+from clothsim._files import path_from
 from clothsim._nearest import brief, hint
-from clothsim._toml import tomllib
 from clothsim.errors import ClothSimError, InvalidInput, InvalidScene
 from clothsim.scene import Scene
 from clothsim.study.axes import NAMED
@@ -46,7 +46,7 @@ def read(path: str | os.PathLike[str], fixed: Mapping[str, Any] | None = None) -
     InvalidInput, InvalidScene
         The file cannot be read, or asks for what there is not; file and key are named.
     """
-    where = Path(path)
+    where = path_from(path)
     try:
         return _made(_parsed(where), where, dict(fixed or {}))
     except InvalidInput as error:
@@ -63,7 +63,7 @@ def _parsed(where: Path) -> dict[str, Any]:
             content = file.read(_MOST_BYTES + 1)
         if len(content) > _MOST_BYTES:
             raise ValueError(f"more than {_MOST_BYTES // 2**20} MiB")
-        tables = tomllib.loads(content.decode("utf-8"))
+        tables = _toml.loads(content.decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         reason = "nested too deep" if isinstance(error, RecursionError) else getattr(error, "strerror", None) or error
         raise InvalidInput(f"cannot read the sweep: {reason}", name="SWEEP") from error
@@ -156,7 +156,7 @@ def _scenes(given: Any, where: Path) -> dict[str, Scene]:
         raise InvalidInput(f"scene: expected {expected}, got {got}", name="scene", expected=expected, got=got)
     if twice := sorted(path for path, times in Counter(paths).items() if times > 1):
         raise InvalidInput(f"scene: expected each once, got {', '.join(twice)} twice", name="scene")
-    return {path if len(paths) > 1 else "": Scene.load(where.parent / path) for path in paths}
+    return {path if len(paths) > 1 else "": Scene.load(path_from(where.parent / path, "scene")) for path in paths}
 
 
 def _inline(tables: dict[str, Any], where: Path) -> Scene:

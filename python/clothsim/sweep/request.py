@@ -34,6 +34,8 @@ SERIES = {
     "contacts": "what contact met and resolved since the frame before",
 }
 _MOST_RUNS = 100_000
+_MOST_SEED = 2**62  # so that the last of the runs' seeds is a number of 64 bits in the tables
+_MOST = 1e12  # as of the numbers of a scene
 _DEFAULT_METRICS = ("lowest", "strain_energy", "kinetic_energy", "contact_error")
 
 
@@ -115,14 +117,15 @@ class Request:
         self.axes = _axes(vary, self.combine)
         self.draws = [draw(key, table) for key, table in (draws or {}).items()]
         self.seeds = _seeds(seeds, seed, self.draws)
-        self.disturbance = _number("disturbance", disturbance, "a number ≥ 0 [m/s]", zero=True)
+        self.disturbance = _number("disturbance", disturbance, f"a number ≥ 0, at most {_MOST:g} [m/s]", zero=True)
         self.metrics = [_metric(one) for one in _names("metrics", metrics)]
         known = [*SERIES, *(m.name for m in METRICS.values() if m.kind == "quantity")]
         self.series = [one_of("series", one, known) for one in _names("series", series)]
-        self.timeout = None if timeout is None else _number("timeout", timeout, "a number > 0 [s]")
+        seconds = f"a number > 0, at most {_MOST:g} [s]"
+        self.timeout = None if timeout is None else _number("timeout", timeout, seconds)
         self.threads, self.device = check_threads(threads) or 1, check_device(device)
         self.checkpoint_interval = None if checkpoint_interval is None else _number(
-            "checkpoint_interval", checkpoint_interval, "a number > 0 [s]"
+            "checkpoint_interval", checkpoint_interval, seconds
         )  # fmt: skip
         self.bases = {key: based(scene, self.fixed) for key, scene in self.scenes.items()}
         self.packed = {key: pack_scene(scene) for key, scene in self.scenes.items()}
@@ -270,12 +273,14 @@ def _seeds(seeds: int | None, first: int, draws: Sequence[Draw]) -> list[int | N
             raise InvalidInput(f"{name}: expected a whole number ≥ {least}, got {value!r}", name=name)
     if seeds > _MOST_RUNS:
         raise InvalidInput(f"seeds: expected at most {_MOST_RUNS}, got {seeds}", name="seeds")
+    if first > _MOST_SEED:
+        raise InvalidInput(f"seed: expected at most {_MOST_SEED}, got {first}", name="seed")
     return [first + k for k in range(seeds)]
 
 
 def _number(name: str, value: Any, expected: str, *, zero: bool = False) -> float:
-    good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-    if not good or value < 0 or (value == 0 and not zero):
+    good = isinstance(value, (int, float)) and not isinstance(value, bool) and 0 <= value <= _MOST
+    if not good or (value == 0 and not zero):
         raise InvalidInput(f"{name}: expected {expected}, got {value!r}", name=name, expected=expected)
     return float(value)
 
