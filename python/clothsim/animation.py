@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 from numpy.typing import ArrayLike
 
 from clothsim._arrays import Floats, Ints, floats, indices, number
+from clothsim._files import path_from
 from clothsim.errors import InvalidInput
 
 __all__ = ["Animation"]
@@ -81,7 +81,7 @@ class Animation:
         from clothsim._formats import animation as formats
 
         request = formats.Request(fps, scale, up, scene_up, animation, part)
-        raw = formats.read(Path(path), request)
+        raw = formats.read(path_from(path), request)
         rate = fps if fps is not None else raw.fps
         if rate is None:
             expected = "frames per second > 0, which this file does not say"

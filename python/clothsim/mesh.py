@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from clothsim import _core, _formats
 from clothsim._arrays import Floats, Ints, floats, indices, number
-from clothsim._files import write_whole
+from clothsim._files import path_from, write_whole
 from clothsim._formats import RawMesh
 from clothsim.errors import InvalidInput
 
@@ -305,7 +304,7 @@ class Mesh:
         MeshError
             The file is missing, unreadable or damaged, or what it holds is no usable mesh.
         """
-        where = Path(path)
+        where = path_from(path)
         raw = _formats.read(where)
         try:
             return cls(*raw)
@@ -321,7 +320,7 @@ class Mesh:
         path : str or path
             The file, ``.obj`` or ``.ply``; replaced if it is there.
         """
-        where = Path(path)
+        where = path_from(path)
         write_whole(where, _formats.write(where, RawMesh(self._vertices, self._triangles, self._uv, self._groups)))
 
     def __repr__(self) -> str:

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import io
-import json
 import os
-import zipfile
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clothsim._arrays import Floats, Ints, floats, number
-from clothsim._files import whole
+from clothsim._files import path_from
 from clothsim.errors import InvalidInput
 
 __all__ = ["Body", "Recording", "body_facts", "flattened"]
-
-_FORMAT = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +37,8 @@ class Body:
     rest : {"uv", "start"} or (m, 3, 2) float64 or None
         The undeformed shape of a cloth: its ``uv``; its positions in the first frame; per triangle, the corners in the
         triangle's own plane [m]; None where it is not known.
+    regions : mapping of str to (k,) int64
+        Triangles of each region of a cloth that has a material of its own, ascending, none in two of them.
     """
 
     name: str
@@ -53,6 +48,7 @@ class Body:
     uv: Floats | None = None
     static: bool = False
     rest: Literal["uv", "start"] | Floats | None = None
+    regions: Mapping[str, Ints] = field(default_factory=dict)
 
 
 class Recording:
@@ -202,6 +198,11 @@ class Recording:
             return None if found.uv is None else np.array(found.uv)
         return flattened(self.positions(found, 0), found.triangles) if len(self) else None
 
+    def reach(self) -> float:
+        """Largest coordinate of any body in any frame, in size [m]; 0 where there is none."""
+        parts = (a for a in (self._moving, self._standing) if a.size)
+        return max((max(float(a.max()), -float(a.min())) for a in parts), default=0.0)
+
     @property
     def has_velocities(self) -> bool:
         """Whether velocities were kept."""
@@ -220,54 +221,18 @@ class Recording:
         ``positions`` (frames, n, 3), ``triangles`` (m, 3) and ``uv`` (m, 3, 2; NaN where a cloth has none) hold all
         cloths joined, ``velocities`` (frames, n, 3) where they were kept; ``times`` (frames,);
         ``collider_0_positions`` (frames or 1 if static, n, 3) and ``collider_0_triangles`` each collider; ``rest_0``
-        (m, 3, 2) the undeformed shape of a cloth where it is neither its ``uv`` nor the first frame; ``meta`` a JSON
-        text with names, ranges, fps, the up axis and the thickness.
+        (m, 3, 2) the undeformed shape of a cloth where it is neither its ``uv`` nor the first frame; ``regions_0`` (m,)
+        the number of the region of each triangle of a cloth that has regions, −1 for none; ``meta`` a JSON text with
+        names, ranges, fps, the up axis and the thickness.
 
         Parameters
         ----------
         path : str or path
             The file.
         """
-        with whole(Path(path)) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-            for name, shape, rows in self._members():
-                _write_member(archive, name, shape, rows)
+        from clothsim._export import archive
 
-    def _members(self) -> Iterator[tuple[str, NDArray[Any] | tuple[int, ...], Iterable[Floats]]]:
-        cloth = self.cloth
-        count = sum(b.vertex_count for b in cloth)
-        firsts = np.cumsum([0, *(b.vertex_count for b in cloth)]).tolist()
-        yield "times", self.times, ()
-        yield "positions", (len(self), count, 3), (self._moving[f][:count] for f in range(len(self)))
-        if self._velocities is not None:
-            yield "velocities", (len(self), count, 3), (self._velocities[f] for f in range(len(self)))
-        triangles = [b.triangles + first for b, first in zip(cloth, firsts, strict=False)]
-        yield "triangles", np.concatenate([np.zeros((0, 3), np.int64), *triangles]), ()
-        if any(b.uv is not None for b in cloth):
-            uv = [np.full((len(b.triangles), 3, 2), np.nan) if b.uv is None else b.uv for b in cloth]
-            yield "uv", np.concatenate(uv), ()
-        for index, body in enumerate(cloth):
-            if isinstance(body.rest, np.ndarray):
-                yield f"rest_{index}", body.rest, ()
-        for index, body in enumerate(b for b in self.bodies if b.kind == "collider"):
-            where = self._slices[body.name]
-            if body.static:
-                yield f"collider_{index}_positions", self._standing[where][None], ()
-            else:
-                shape = (len(self), body.vertex_count, 3)
-                rows = (self._moving[f][where] for f in range(len(self)))
-                yield f"collider_{index}_positions", shape, rows
-            yield f"collider_{index}_triangles", body.triangles, ()
-        meta = {
-            "format": _FORMAT, "name": self.name, "fps": self.fps, "up": self.up, "units": "m, s",
-            "thickness": self.thickness,
-            "bodies": [
-                {"name": b.name, "kind": b.kind, "vertex_count": b.vertex_count, "static": b.static,
-                 "triangle_count": len(b.triangles), "uv": b.uv is not None,
-                 "rest": "array" if isinstance(b.rest, np.ndarray) else b.rest}
-                for b in self.bodies
-            ],
-        }  # fmt: skip
-        yield "meta", np.array(json.dumps(meta)), ()
+        archive.write(self, path_from(path))
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Recording:
@@ -285,8 +250,9 @@ class Recording:
         """
         from clothsim._formats import recorded
 
+        where = path_from(path)
         try:
-            found = recorded.read(Path(path))
+            found = recorded.read(where)
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise InvalidInput(f"{path}: not a recording that can be read: {reason}", name="path") from error
@@ -299,6 +265,7 @@ class Recording:
                 b.uv,
                 b.static,
                 b.rest,
+                b.regions,
             )
             for b in found.bodies
         ]
@@ -317,7 +284,7 @@ class Recording:
         """
         from clothsim._export import usd
 
-        usd.write(self, Path(path))
+        usd.write(self, path_from(path))
 
     def save_gltf(self, path: str | os.PathLike[str]) -> None:
         """Write a binary glTF file (``.glb``) whose morph targets are the frames.
@@ -329,7 +296,7 @@ class Recording:
         """
         from clothsim._export import gltf
 
-        gltf.write(self, Path(path))
+        gltf.write(self, path_from(path))
 
     def save_pc2(self, folder: str | os.PathLike[str]) -> None:
         """Write a mesh and a point cache (PC2) per body into a new folder.
@@ -341,7 +308,7 @@ class Recording:
         """
         from clothsim._export import pc2
 
-        pc2.write(self, Path(folder))
+        pc2.write(self, path_from(folder, "folder"))
 
     def save_vtk(self, folder: str | os.PathLike[str]) -> None:
         """Write VTK files and a ParaView collection, ``scene.pvd``, into a new folder. Needs PyVista.
@@ -353,7 +320,7 @@ class Recording:
         """
         from clothsim._export import vtk
 
-        vtk.write(self, Path(folder))
+        vtk.write(self, path_from(folder, "folder"))
 
     def save_sequence(self, folder: str | os.PathLike[str], suffix: str = "obj") -> None:
         """Write one mesh file per frame and body into a new folder: ``<body>_0000.obj`` or ``.ply``.
@@ -367,7 +334,7 @@ class Recording:
         """
         from clothsim._export import sequence
 
-        sequence.write(self, Path(folder), suffix)
+        sequence.write(self, path_from(folder, "folder"), suffix)
 
     def film_strip(self, path: str | os.PathLike[str], *, moments: int = 8) -> None:
         """Render that many moments side by side into a PNG. Needs PyVista.
@@ -381,7 +348,7 @@ class Recording:
         """
         from clothsim._export import film_strip
 
-        film_strip.write(self, Path(path), moments=moments)
+        film_strip.write(self, path_from(path), moments=moments)
 
 
 def flattened(x: Floats, triangles: Ints) -> Floats:
@@ -408,27 +375,11 @@ def _slices(bodies: Sequence[Body]) -> dict[str, slice]:
     return out
 
 
-def _write_member(
-    archive: zipfile.ZipFile, name: str, array: NDArray[Any] | tuple[int, ...], rows: Iterable[Floats]
-) -> None:
-    """One array of an ``.npz``, as numpy writes it; where a shape is given, its rows are streamed."""
-    info = zipfile.ZipInfo(f"{name}.npy")  # dated 1980: the same bytes at any time
-    with archive.open(info, "w", force_zip64=True) as member:
-        if isinstance(array, np.ndarray):
-            buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.asarray(array, order="C"), allow_pickle=False)
-            member.write(buffer.getvalue())
-            return
-        header = {"descr": "<f8", "fortran_order": False, "shape": array}
-        np.lib.format.write_array_header_1_0(member, header)
-        for row in rows:
-            member.write(np.ascontiguousarray(row, dtype="<f8").tobytes())
-
-
 def body_facts(body: Body) -> dict[str, Any]:
     """Names and sizes of a body, for a report."""
     facts = asdict(body)
     facts["triangle_count"] = len(facts.pop("triangles"))
     facts.pop("uv")
     facts.pop("rest")
+    facts["regions"] = {name: len(triangles) for name, triangles in body.regions.items()}
     return facts

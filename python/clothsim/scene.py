@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from clothsim import _core, _formats
 from clothsim._arrays import Floats, Ints, floats
 from clothsim._export.names import file_stem
-from clothsim._files import write_whole
+from clothsim._files import path_from, write_whole
 from clothsim._formats import RawMesh, numpy_files
 from clothsim._plain import plain
 from clothsim.animation import Animation
@@ -288,7 +288,7 @@ class Scene:
         InvalidScene
             The file cannot be read, or says something that cannot be simulated; file, line and key are named.
         """
-        where = Path(path)
+        where = path_from(path)
         try:
             text = where.read_bytes().decode("utf-8")
         except (OSError, UnicodeDecodeError) as error:
@@ -346,7 +346,7 @@ class Scene:
         path : str or path
             The scene file.
         """
-        where = Path(path)
+        where = path_from(path)
         data = self.to_dict()
         stems = iter(_file_stems(where.stem, [body["name"] for body in (*data["cloth"], *data["collider"])]))
         names = (asset for _, is_sequence, _, asset in self.check().files() if is_sequence)

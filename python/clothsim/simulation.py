@@ -6,7 +6,6 @@ import json
 import logging
 import os
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -14,7 +13,7 @@ from numpy.typing import ArrayLike
 from clothsim import _core
 from clothsim._arrays import Floats, Ints, number
 from clothsim._device import check_device, check_threads
-from clothsim._files import write_whole
+from clothsim._files import path_from, write_whole
 from clothsim._frames import frame_lengths
 from clothsim._logs import EngineLog, step_reports
 from clothsim._progress import progress_bar
@@ -152,10 +151,10 @@ class Simulation:
         """
         from clothsim._run.start import Start
 
-        if isinstance(recording, str | os.PathLike):
-            start = Start.of_run(Path(recording), scene, frame, state=state)
-        else:
+        if isinstance(recording, Recording):
             start = Start.of(recording, scene, -1 if frame is None else frame)
+        else:
+            start = Start.of_run(path_from(recording, "recording"), scene, frame, state=state)
         return cls._from_start(scene, start, threads, device, allow_intersections=allow_intersections)
 
     @classmethod
@@ -399,7 +398,7 @@ class Simulation:
             Write the table of each step too. They grow with the run; without them, a simulation that goes on from here
             has the totals of all steps and the tables of the later ones.
         """
-        write_whole(Path(path), self._core.checkpoint(0 if steps else step_reports(self._core)))
+        write_whole(path_from(path), self._core.checkpoint(0 if steps else step_reports(self._core)))
 
     @classmethod
     def resume(
@@ -439,10 +438,10 @@ class Simulation:
         if scene is not None:
             from clothsim._run.start import Start
 
-            start = Start.of_state(Path(path))
+            start = Start.of_state(path_from(path))
             return cls._from_start(scene, start, threads, device, allow_intersections=False)
         try:
-            content = Path(path).read_bytes()
+            content = path_from(path).read_bytes()
         except OSError as error:
             raise CheckpointError(f"{path}: cannot read the checkpoint: {error.strerror or error}") from error
         return cls._from_bytes(content, threads, device)

@@ -11,7 +11,7 @@ from typing import Any
 
 from conftest import ROOT
 
-from clothsim._toml import tomllib
+from clothsim import _toml
 
 __all__ = ["Block", "blocks", "commands", "in_a_scene", "pages"]
 
@@ -73,7 +73,7 @@ def commands(text: str) -> Iterator[list[str]]:
 
 def in_a_scene(text: str) -> dict[str, Any]:
     """Read a fragment of a scene file, and add what it needs to be a scene: meshes, shapes, places, named bodies."""
-    scene = tomllib.loads(text)
+    scene = _toml.loads(text)
     scene.setdefault("duration", 0.1)
     mesh = {"generator": "grid", "width": 0.2, "height": 0.2, "nx": 5, "ny": 5}
     for k, cloth in enumerate(scene.setdefault("cloth", [{}])):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import shutil
 import zlib
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from clothsim._files import whole
 from clothsim._run.job import Job
 from clothsim._run.sealed import read_sealed, write_sealed
 from clothsim._run.start import Start
-from clothsim._run.states import read_state, states_of
+from clothsim._run.states import frame_count, read_state, states_of
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +107,7 @@ def test_damaged_and_foreign_states_are_refused(fallen: Path, tmp_path: Path) ->
         ({**header, "unpacked": -1}, packed, "when unpacked"),
         ({**header, "unpacked": "many"}, packed, "when unpacked"),
         ({**header, "unpacked": 2**24}, zlib.compress(bytes(2**26), 9), "when unpacked"),
-        (unpacked, body[:8] + b"\x09\0\0\0" + body[12:], "expected version 1 of the state of a frame, got version 9"),
+        (unpacked, body[:8] + b"\x09\0\0\0" + body[12:], "expected version 2 of the state of a frame, got version 9"),
         ({"frames": 3}, body, "expected the state of a frame, got another file of a run"),
         (unpacked, cs.Simulation(scene)._core.checkpoint(0), "starts with"),
         (unpacked, body[:-8] + bytes(8), "checksum"),
@@ -144,3 +146,74 @@ def test_collider_that_moved_is_met_anew_and_others_are_not(fallen: Path) -> Non
     bare = cs.Simulation.from_frame(scene, fallen, 9, state=False)
     bare.advance(1 / 40)
     assert np.abs(bare.positions - frames.positions("cloth", 10)).max() > 1e-7
+
+
+def walking(folder: Path, *, lift: float = 0.0, width: float = 0.6) -> cs.Scene:
+    """Cloth from a file on an animated mesh from another, both in place of what was there under the same names."""
+    box = cs.Mesh.box((0.2, 0.2, 0.2))
+    rise = np.array([0.0, 0.0, 0.0, 0.0, 1.0])[:, None, None] * [0.0, lift, 0.0]
+    np.savez(folder / "walk.npz", positions=box.vertices + rise, triangles=box.triangles)
+    cs.Mesh.grid(width, 0.6, 7, 7).save(folder / "cloth.obj")
+    path = folder / "scene.toml"
+    path.write_text(
+        "duration = 0.2\n[contact]\nthickness = 0.01\n[output]\nfps = 20\nstates = 1\nvelocities = true\n"
+        "usd = false\nfilm_strip = false\nplots = false\n"
+        '[[cloth]]\nname = "cloth"\nmaterial = "cotton"\nmesh = { file = "cloth.obj" }\nposition = [0.0, 0.3, 0.0]\n'
+        '[[collider]]\nname = "body"\nsequence = { file = "walk.npz", fps = 20 }\n'
+    )
+    return cs.Scene.load(path)
+
+
+def test_files_that_changed_under_their_names_are_listed(tmp_path: Path) -> None:
+    scene = walking(tmp_path)
+    Job(scene, tmp_path / "out", progress=False).run()
+    sim = cs.Simulation(scene)
+    sim.advance(0.1)
+    sim.save_checkpoint(tmp_path / "a.checkpoint")
+
+    def edited(scene: cs.Scene) -> list[str]:
+        sims = [
+            cs.Simulation.from_frame(scene, tmp_path / "out", 2),
+            cs.Simulation.resume(tmp_path / "a.checkpoint", scene=scene),
+        ]
+        listed: list[list[str]] = [sim.report["continued"]["edited"] for sim in sims]
+        assert listed[0] == listed[1]
+        return listed[0]
+
+    assert edited(walking(tmp_path)) == []
+    assert edited(walking(tmp_path, lift=0.1)) == ["collider[0].sequence"]
+    assert edited(walking(tmp_path, lift=0.1, width=0.61)) == ["cloth[0].mesh", "collider[0].sequence"]
+    later = walking(tmp_path, lift=0.1)
+    report = Job(later, tmp_path / "on", progress=False, start=Start.of_run(tmp_path / "out", later, 2)).run()
+    assert report["continued"]["edited"] == ["collider[0].sequence"]
+
+
+@pytest.mark.parametrize("state", [True, False])
+def test_another_mesh_of_the_same_name_is_refused(tmp_path: Path, state: bool) -> None:
+    Job(walking(tmp_path), tmp_path / "out", progress=False).run()
+    kind, grid = cs.InvalidScene if state else cs.InvalidInput, cs.Mesh.grid(0.6, 0.6, 7, 7)
+    for mesh, match in (
+        (cs.Mesh.grid(0.6, 0.6, 7, 8), "49 vertices .* got 56"),
+        (cs.Mesh(grid.vertices, grid.triangles[::-1]), "triangles .* got other"),
+    ):
+        scene = walking(tmp_path)
+        mesh.save(tmp_path / "cloth.obj")
+        scene = cs.Scene.load(tmp_path / "scene.toml")
+        with pytest.raises(kind, match=f"cloth.*expected the {match}"):
+            cs.Simulation.from_frame(scene, tmp_path / "out", 2, state=state)
+
+
+def test_what_else_lies_beside_states(fallen: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(fallen, run)
+    known = states_of(run)
+    for name in ("²2.state", "-1.state", "٣٣٣٣٣٣.state", "a.state", "9" * 5000 + ".state"):
+        with contextlib.suppress(OSError):  # too long for this file system
+            (run / "states" / name).write_bytes(b"")
+    assert states_of(run) == known
+    assert frame_count(run) == len(cs.Recording.load(run / "frames.npz"))
+    for content in ('{"frame_count": 1e999}', '{"frame_count": "3"}', "[]", "[" * 100000, "\xff"):
+        (run / "report.json").write_text(content, encoding="latin-1")
+        assert frame_count(run) is None
+        with pytest.raises(cs.InvalidInput, match="frame: expected"):
+            cs.Simulation.from_frame(falling(), run, -1)

@@ -47,6 +47,13 @@ def test_groups_of_an_obj_file_are_read_and_written(tmp_path: Path) -> None:
     assert {k.replace(" ", "_"): v.tolist() for k, v in mesh.groups.items()} == {
         k: v.tolist() for k, v in again.groups.items()
     }
+    # Faces in no group are in the one that the format calls so; a "g" without a name is not read everywhere.
+    cs.Mesh(GRID.vertices, GRID.triangles, groups={"hem": np.array([3]), "default": np.array([5])}).save(
+        tmp_path / "d.obj"
+    )
+    lines = [line for line in (tmp_path / "d.obj").read_text().splitlines() if line.startswith("g")]
+    assert lines == ["g default", "g hem", "g default", "g default_", "g default"]
+    assert {k: v.tolist() for k, v in cs.Mesh.load(tmp_path / "d.obj").groups.items()} == {"hem": [3], "default_": [5]}
     with pytest.raises(cs.InvalidInput, match=r"groups\['a'\]: expected triangles in 0..32, got 32"):
         cs.Mesh(GRID.vertices, GRID.triangles, groups={"a": np.array([1, 32])})
 
@@ -274,6 +281,8 @@ def test_a_seam_is_part_of_a_checkpoint_to_the_same_bits(tmp_path: Path) -> None
         ({"edges": [[0, 40], [81, 82]]}, r"seams\[0\].edges\[0\]\[1\]: expected a vertex on the boundary .*got 40"),
         ({"edges": [[0, 81], [81, 82]]}, r"seams\[0\].edges\[0\]\[1\]: expected a vertex on the same boundary as 0"),
         ({"edges": [[0, 8, 0], [81, 82]]}, r"seams\[0\].edges\[0\]: expected a run that meets each vertex once"),
+        ({"edges": [[0, 8], [81, 81]]}, r"seams\[0\].edges\[1\]: expected a run to another vertex, got \[81, 81\]"),
+        ({"edges": [[0, 8], [0, 8]]}, r"seams\[0\].edges: expected two runs of different vertices, .*the same"),
         ({"pairs": [[0, 81]], "duration": -1}, r"seams\[0\].duration: .*≥ 0"),
         ({"pairs": [[0, 81]], "start": 1e30}, r"seams\[0\].start"),
         ({"pairs": [[0, 81]], "stiffness": 0}, r"seams\[0\].stiffness: .*> 0"),
@@ -286,6 +295,18 @@ def test_bad_seams_are_named(seam: dict[str, Any], message: str) -> None:
     with pytest.raises(cs.InvalidScene, match=message):
         scene.add_cloth(panels(0.1)[0], "cotton", seams=[seam])
         cs.Simulation(scene)
+
+
+def test_runs_of_unlike_lengths_are_warned_of() -> None:
+    def warnings(second: list[int]) -> list[str]:
+        scene = cs.Scene(duration=0.1)
+        scene.add_cloth(panels(0.1)[0], "cotton", seams=[{"edges": [[0, 8], second]}])
+        return [text for text in cs.Simulation(scene).plan["warnings"] if "runs" in text]
+
+    assert warnings([81, 89]) == []
+    assert warnings([81, 84]) == []
+    (text,) = warnings([81, 83])
+    assert text.startswith('cloth[0].seams[0].edges: the runs of "cloth" are ')
 
 
 # Attachments ------------------------------------------------------------------------------------------------------

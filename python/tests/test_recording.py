@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +56,12 @@ def test_npz_reads_back_and_equal_recordings_are_equal_bytes(tmp_path: Path, fra
         assert np.isnan(data["uv"][-1]).all()
         assert data["collider_0_positions"].shape == (5, 42, 3)
         assert data["collider_1_positions"].shape == (1, 42, 3)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "frames.npz")
+    with pytest.raises(cs.InvalidInput, match=r"frames\.npz: not a recording that can be read: it is no file"):
+        cs.Recording.load(tmp_path / "frames.npz")
 
 
 def test_usd_says_what_the_recording_says(tmp_path: Path, frames: cs.Recording) -> None:

@@ -80,7 +80,7 @@ def test_frames_and_cloths_that_do_not_fit_are_named() -> None:
         cs.Simulation.from_frame(other, frames)
     finer = cs.Scene(duration=1.0)
     finer.add_cloth(cs.Mesh.grid(1.0, 1.0, 8, 8), "cotton", name="sheet")
-    with pytest.raises(cs.InvalidInput, match="positions: expected one row for each cloth vertex.*49 for 64"):
+    with pytest.raises(cs.InvalidInput, match="cloth 'sheet': expected the 49 vertices that it has.*got 64"):
         cs.Simulation.from_frame(finer, frames)
     broken = np.stack([frames.positions("sheet", f) for f in range(3)])
     broken[2, 5, 1] = np.nan

@@ -301,6 +301,34 @@ def test_runs_that_are_not_whole_say_so(run: Path, tmp_path: Path) -> None:
         Source.of(copy).frames()
 
 
+@pytest.mark.parametrize("change", [
+    lambda report: report["frames"][3].pop("energy"),
+    lambda report: report["frames"][3]["energy"].pop("total"),
+    lambda report: report["frames"][3].update(time="late"),
+    lambda report: report["frames"][3].update(seconds=None),
+    lambda report: report["frames"][3]["contact"].update(collisions="many"),
+    lambda report: report["frames"].append(7),
+    lambda report: report["frames"][3].update(work={"pins": 1}),
+    lambda report: report["frames"][3]["effects"].update(hinge=float("nan")),
+    lambda report: report["effects"].append({}),
+])  # fmt: skip
+def test_a_report_that_is_not_what_it_should_be(run: Path, tmp_path: Path, change: Any) -> None:
+    """Stills and pages do without it; plots are refused."""
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    shutil.copy(run / "frames.npz", copy)
+    report = json.loads((run / "report.json").read_bytes())
+    (copy / "report.json").write_text(json.dumps(report))
+    assert Source.of(copy).facts
+    change(report)
+    (copy / "report.json").write_text(json.dumps(report))
+    (notice,) = Source.of(copy).notices
+    assert notice.startswith("report.json cannot be read (")
+    assert _cli.main(["view", str(copy), "--browser", "-q"]) == 0
+    assert _cli.main(["view", str(copy), "--plots", str(copy / "plots.png"), "-q"]) == 2
+    assert not (copy / "plots.png").exists()
+
+
 @pytest.mark.parametrize(("arguments", "code", "message"), [
     (["none"], 2, "none: expected the folder of a run (clothsim run SCENE -o OUT makes one), got nothing of that name"),
     (["empty"], 2, "expected the folder of a run (frames.npz, report.json), got a folder with nothing"),
@@ -323,6 +351,9 @@ def test_runs_that_are_not_whole_say_so(run: Path, tmp_path: Path) -> None:
     (["bare.npz", "--color", "contact"], 2, "--color contact: expected a run with contact, got one without"),
     (["bare.npz", "--plots", "p.png"], 2, "expected a run with a report for --plots, got one without"),
     (["nothing.npz"], 2, "expected a run with frames, got a recording of none"),
+    (["nobody.npz"], 2, "expected a run with bodies, got a recording of none"),
+    (["nobody.npz", "--browser"], 2, "expected a run with bodies, got a recording of none"),
+    (["afar.npz", "--browser"], 2, "expected coordinates up to 1e+12 m, got 1e+300 m"),
 ])  # fmt: skip
 def test_bad_input_is_named(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
@@ -337,11 +368,13 @@ def test_bad_input_is_named(
     bodies = [cs.Body("a", "cloth", 3, np.array([[0, 1, 2]]))]
     cs.Recording(bodies, np.zeros(1), np.eye(3)[None]).save("bare.npz")
     cs.Recording(bodies, np.zeros(0), np.zeros((0, 3, 3))).save("nothing.npz")
+    cs.Recording([], np.zeros(1), np.zeros((1, 0, 3))).save("nobody.npz")
+    cs.Recording(bodies, np.zeros(1), 1e300 * np.eye(3)[None]).save("afar.npz")
     before = sorted(tmp_path.rglob("*"))
     words = [str(run) if word == "RUN" else word for word in arguments]
     makes = {"--still", "--film", "--plots", "--browser", "--open"}
     try:
-        got = _cli.main(["view", *words, *([] if makes & set(words) else ["--still", "x.png"]), "--quiet"])
+        got = _cli.main(["view", *words, *([] if makes & set(words) else ["--still", "x.png"]), "-q"])
     except SystemExit as stop:
         got = int(str(stop.code))
     said = capsys.readouterr().err

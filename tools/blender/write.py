@@ -22,7 +22,8 @@ def main(folder: Path) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     scene = cs.Scene(name="blender", duration=0.5, contact={"thickness": 0.01}, time={"dt": 0.01})
-    scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 13, 13), "cotton", name="napkin", position=(0.05, 0.5, 0.0))
+    hem = {"vertices": list(range(3 * 13)), "material": "denim"}
+    scene.add_cloth(cs.Mesh.grid(1.0, 1.0, 13, 13), "cotton", name="napkin", position=(0.05, 0.5, 0.0), regions=[hem])
     scene.add_collider(
         "ball",
         shape={"type": "sphere", "radius": 0.3, "tolerance": 0.005},
@@ -39,7 +40,7 @@ def main(folder: Path) -> None:
     skinned(keys=25).save(folder / "body.glb")
     body = cs.Animation.load(folder / "body.glb", fps=24)
     expected = {f"{b.name}": np.stack([frames.positions(b, f) for f in range(len(frames))]) for b in frames.bodies}
-    np.savez(folder / "expected.npz", **expected, body=body.positions)
+    np.savez(folder / "expected.npz", **expected, body=body.positions, hem=frames.body("napkin").regions["denim"])
     print(f"{folder}: {len(frames)} frames")
 
 

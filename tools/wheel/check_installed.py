@@ -153,6 +153,9 @@ def oldest(wheel: Path) -> list[str]:
 def from_sdist(python: str, sdist: Path, folder: Path) -> None:
     """Build a wheel from the source distribution as pip does, in an environment of its own, and use it."""
     target = ROOT / "target" / "sdist"  # so that the next time compiles clothsim alone
+    # All files of the archive have one date: cargo would take the clothsim of the last time for that of this one.
+    for known in target.glob("release/.fingerprint/cloth-*"):
+        shutil.rmtree(known)
     inside = environment(python, folder / "build")
     wheels = folder / "wheels"
     command = [inside, "-m", "pip", "wheel", "--disable-pip-version-check", "--no-deps", "-w", str(wheels), str(sdist)]

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use cloth_sim::scene::Rotation;
-use cloth_sim::{Advance, Assets, BodyKind, Sequence, SimError, Simulation, SimulationOptions};
+use cloth_sim::{Advance, Assets, BodyInfo, BodyKind, Sequence, SimError, Simulation, SimulationOptions};
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -47,9 +47,7 @@ impl PySimulation {
         start: Option<(f64, Bound<'_, PyAny>, Bound<'_, PyAny>)>,
     ) -> PyResult<Self> {
         let assets = assets_from(meshes, sequences, velocities)?;
-        let device = device.parse().map_err(|error| device_error(py, &error))?;
-        let options =
-            SimulationOptions { threads, allow_intersections, device, ..SimulationOptions::default() };
+        let options = options_from(py, threads, device, allow_intersections)?;
         let scene = &scene.get().scene;
         let start = match start {
             Some((time, x, v)) => {
@@ -57,28 +55,21 @@ impl PySimulation {
             }
             None => None,
         };
-        let simulation = py
-            .detach(|| {
-                match &start {
-                    Some((time, x, v)) => Simulation::start_from(scene, assets, options, *time, x, v),
-                    None => Simulation::new(scene, assets, options),
-                }
-                .map_err(Box::new)
-            })
-            .map_err(|error| sim_error(py, &error))?;
-        Ok(Self { simulation: Mutex::new(simulation) })
+        Self::built(py, || {
+            match &start {
+                Some((time, x, v)) => Simulation::start_from(scene, assets, options, *time, x, v),
+                None => Simulation::new(scene, assets, options),
+            }
+            .map_err(Box::new)
+        })
     }
 
     /// The simulation that a checkpoint holds.
     #[staticmethod]
     #[pyo3(signature = (bytes, threads, device))]
     fn resume(py: Python<'_>, bytes: &[u8], threads: Option<usize>, device: &str) -> PyResult<Self> {
-        let device = device.parse().map_err(|error| device_error(py, &error))?;
-        let options = SimulationOptions { threads, device, ..SimulationOptions::default() };
-        let simulation = py
-            .detach(|| Simulation::resume_on(bytes, options).map_err(Box::new))
-            .map_err(|error| sim_error(py, &error))?;
-        Ok(Self { simulation: Mutex::new(simulation) })
+        let options = options_from(py, threads, device, false)?;
+        Self::built(py, || Simulation::resume_on(bytes, options).map_err(Box::new))
     }
 
     /// The scene from a state on that `frame_state` gave.
@@ -96,14 +87,9 @@ impl PySimulation {
         allow_intersections: bool,
     ) -> PyResult<Self> {
         let assets = assets_from(meshes, sequences, velocities)?;
-        let device = device.parse().map_err(|error| device_error(py, &error))?;
-        let options =
-            SimulationOptions { threads, allow_intersections, device, ..SimulationOptions::default() };
+        let options = options_from(py, threads, device, allow_intersections)?;
         let scene = &scene.get().scene;
-        let simulation = py
-            .detach(|| Simulation::continue_from(state, scene, assets, options).map_err(Box::new))
-            .map_err(|error| sim_error(py, &error))?;
-        Ok(Self { simulation: Mutex::new(simulation) })
+        Self::built(py, || Simulation::continue_from(state, scene, assets, options).map_err(Box::new))
     }
 
     /// Take one step of the scene's size.
@@ -211,6 +197,18 @@ impl PySimulation {
             .collect()
     }
 
+    /// Regions of material: number of the body, number of the region in its cloth, and the triangles (k,) of it.
+    fn regions<'py>(&self, py: Python<'py>) -> Vec<(usize, usize, Bound<'py, PyArray1<u32>>)> {
+        let regions = self.read(py, |simulation| {
+            let of = |body: &BodyInfo| body.regions.clone();
+            simulation.bodies().iter().map(of).collect::<Vec<_>>()
+        });
+        let each = regions.into_iter().enumerate();
+        each.flat_map(|(body, regions)| regions.into_iter().map(move |(region, list)| (body, region, list)))
+            .map(|(body, region, list)| (body, region, list.into_pyarray(py)))
+            .collect()
+    }
+
     /// Mechanical energy of the cloth by kind [J], as JSON.
     fn energy(&self, py: Python<'_>) -> PyResult<String> {
         let energy = self.read(py, Simulation::energy);
@@ -287,6 +285,15 @@ impl PySimulation {
         py.detach(|| look(&self.lock()))
     }
 
+    /// What `build` makes while the interpreter is released.
+    fn built(
+        py: Python<'_>,
+        build: impl FnOnce() -> Result<Simulation, Box<SimError>> + Send,
+    ) -> PyResult<Self> {
+        let simulation = py.detach(build).map_err(|error| sim_error(py, &error))?;
+        Ok(Self { simulation: Mutex::new(simulation) })
+    }
+
     fn detached<T: Send>(
         &self,
         py: Python<'_>,
@@ -316,6 +323,17 @@ impl PySimulation {
             None => Ok(advance.steps),
         }
     }
+}
+
+/// What a run may use: `threads`, and the detector's `device` by its name.
+fn options_from(
+    py: Python<'_>,
+    threads: Option<usize>,
+    device: &str,
+    allow_intersections: bool,
+) -> PyResult<SimulationOptions> {
+    let device = device.parse().map_err(|error| device_error(py, &error))?;
+    Ok(SimulationOptions { threads, allow_intersections, device, ..SimulationOptions::default() })
 }
 
 /// The arrays that a scene names.

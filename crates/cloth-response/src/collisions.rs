@@ -76,8 +76,7 @@ impl Hit {
         let to = |gap_t1: f64| (gap_t1 - gap_t0) / motion.dt;
         let friction = kernel.state(&params.friction, mesh, self.vertices[0], self.vertices[3]);
         if gap_t0 >= LEAST_GAP * gap {
-            let least = to(gap_t0.min(gap));
-            let law = NormalLaw { least, spring: 0.0, on_top: false, rubs: false, cap: f64::NEG_INFINITY };
+            let law = NormalLaw::inelastic(to(gap_t0.min(gap)));
             return Contact::new(&stencil, motion.inv_mass, law, friction);
         }
         // Up to there it is a push, which gives no velocity.

@@ -48,6 +48,11 @@ pub(crate) struct NormalLaw {
 }
 
 impl NormalLaw {
+    /// Without an elastic impulse.
+    pub(crate) const fn inelastic(least: f64) -> Self {
+        Self { least, spring: 0.0, on_top: false, rubs: false, cap: f64::NEG_INFINITY }
+    }
+
     /// The normal impulse that the law asks for where it is λ at the velocity `v_n`, without its elastic part.
     fn stop(&self, lambda: f64, v_n: f64, mass: f64) -> f64 {
         (lambda + mass * (self.least - v_n)).max(0.0)
@@ -221,7 +226,7 @@ mod tests {
         Stencil { kind: StencilKind::EdgeEdge, weights: [0.75, 0.25, -0.5, -0.5], ..vertex_triangle() }
     }
 
-    const INELASTIC: NormalLaw = NormalLaw { least: 0.0, spring: 0.0, on_top: false, rubs: false, cap: 0.0 };
+    const INELASTIC: NormalLaw = NormalLaw::inelastic(0.0);
 
     fn solve(
         stencil: &Stencil,
@@ -271,7 +276,7 @@ mod tests {
     #[test]
     fn nothing_attracts() {
         for spring in [0.0, 1.0] {
-            let law = NormalLaw { least: 0.0, spring, on_top: false, rubs: false, cap: 0.01 };
+            let law = NormalLaw { spring, cap: 0.01, ..INELASTIC };
             let mut v = [Vec3::y() * 0.5, Vec3::zeros(), Vec3::zeros(), Vec3::zeros()];
             let contact = solve(&vertex_triangle(), [1.0; 4], law, 0.5, &mut v);
             assert_eq!(contact.impulse, Vec3::zeros());
@@ -284,15 +289,13 @@ mod tests {
     #[test]
     fn repulsion_ends_at_the_cap() {
         let (d, dt) = (1e-3, 0.01);
-        let law =
-            NormalLaw { least: 0.0, spring: f64::INFINITY, on_top: false, rubs: false, cap: 0.1 * d / dt };
+        let law = NormalLaw { spring: f64::INFINITY, cap: 0.1 * d / dt, ..INELASTIC };
         let mut v = [Vec3::y() * -0.05, Vec3::zeros(), Vec3::zeros(), Vec3::zeros()];
         let contact = solve(&vertex_triangle(), [1.0; 4], law, 0.0, &mut v);
         assert!((contact.relative(&v).y - 0.01).abs() < ROUNDING);
 
         // 1/m = 1.38: a spring of 0.04/1.38 changes v_n by 0.04, less than stopping it needs.
-        let law =
-            NormalLaw { least: 0.0, spring: 0.04 / 1.38, on_top: false, rubs: false, cap: 0.1 * d / dt };
+        let law = NormalLaw { spring: 0.04 / 1.38, cap: 0.1 * d / dt, ..INELASTIC };
         let mut v = [Vec3::y() * -0.05, Vec3::zeros(), Vec3::zeros(), Vec3::zeros()];
         let contact = solve(&vertex_triangle(), [1.0; 4], law, 0.0, &mut v);
         assert!(contact.relative(&v).y.abs() < ROUNDING, "the inelastic part still stops it");
@@ -316,7 +319,7 @@ mod tests {
     /// friction.
     #[test]
     fn relaxation_is_idempotent() {
-        let law = NormalLaw { least: 0.0, spring: 2.0, on_top: false, rubs: false, cap: 0.01 };
+        let law = NormalLaw { spring: 2.0, cap: 0.01, ..INELASTIC };
         for mu in [0.0, 0.1, 10.0] {
             let mut kept = [Vec3::new(0.7, -0.4, 0.2), Vec3::x(), Vec3::zeros(), Vec3::zeros()];
             let mut contact = Contact::new(&vertex_triangle(), &[1.0, 2.0, 3.0, 0.0], law, mu).expect("free");

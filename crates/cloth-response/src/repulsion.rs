@@ -82,7 +82,7 @@ fn law(gap_t0: f64, gap_t1: f64, v_n: f64, gap: f64, stiffness: f64, dt: f64) ->
     // The end gap is gap_t1 + dt (v_n' - v_n).
     let least = v_n + (gap.min(gap_t0) - gap_t1) / dt;
     if overlap < 0.0 {
-        NormalLaw { least, spring: 0.0, on_top: false, rubs: false, cap: f64::NEG_INFINITY }
+        NormalLaw::inelastic(least)
     } else {
         let (spring, cap) = (dt * stiffness * overlap, least + push_fraction(dt) * overlap / dt);
         NormalLaw { least, spring, on_top: false, rubs: overlap > DEEP * gap, cap }

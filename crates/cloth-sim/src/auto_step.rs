@@ -7,7 +7,8 @@
 //! a PI controller. Laws with memory see one motion from the start of the step to its end.
 //!
 //! A step whose error stays above the tolerance although it was made smaller [`MAX_REJECTED`] times, as an impact may, is
-//! accepted and counted. A step that fails is halved down to `time.dt_min`; one that makes energy ([`crate::ledger`]) a few times.
+//! accepted and counted. A step that fails is halved down to `time.dt_min`; one that makes energy ([`crate::ledger`]) a few times. Where
+//! the cloth then stands still, it does so for as long as the step was tried first, and starts anew from rest.
 //!
 //! Source: E. Hairer, S. P. Nørsett and G. Wanner, "Solving Ordinary Differential Equations I", 1993, II.4 (step doubling,
 //! local extrapolation); K. Gustafsson, "Control-theoretic techniques for stepsize selection", 1994.
@@ -20,7 +21,7 @@ use cloth_response::Sides;
 use std::time::Instant;
 
 /// Size of the first attempt [s], where `time.dt_max` allows it: most cloth scenes start from rest.
-const FIRST: f64 = 1e-3;
+pub(crate) const FIRST: f64 = 1e-3;
 /// Part of the tolerance that the error of one step may be: over a run they add up to about the whole.
 const SHARE: f64 = 0.1;
 /// Part of the size at which the error would meet the tolerance.
@@ -112,6 +113,7 @@ impl Simulation {
         if control.size == 0.0 {
             control.size = FIRST;
         }
+        let first_size = control.size.clamp(time.dt_min, time.dt_max);
         loop {
             control.size = control.size.clamp(time.dt_min, time.dt_max);
             let (dt, t1) = cut(start, end, control.size);
@@ -136,9 +138,11 @@ impl Simulation {
                             if !floor {
                                 continue;
                             }
-                            (report.dt, report.smallest_dt, report.substeps) = (dt, dt, 2);
+                            // At the smallest size it would stand where it is from one failure to the next, ever shorter.
+                            let (tried, t1) = cut(start, end, first_size);
+                            (report.dt, report.smallest_dt, report.substeps) = (tried, dt, 2);
                             self.stand_still(t1);
-                            self.state.pace.control = control;
+                            self.state.pace.control = Control::default();
                             return self.finish_step(report, started.elapsed().as_secs_f64());
                         }
                     }

@@ -11,6 +11,7 @@ use cloth_core::mesh::{MeshError, RestShape, Topology, TriMesh, generators};
 use cloth_core::{InPlane, Material, Stitch};
 use cloth_response::LimitedEdge;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// What a body is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -35,6 +36,8 @@ pub struct BodyInfo {
     pub triangles: Vec<[u32; 3]>,
     /// Material coordinates per triangle corner [m], if the mesh has them.
     pub uv: Option<Vec<[[f64; 2]; 3]>>,
+    /// By the number of each of the scene's regions that has any: its triangles, ascending, in no other region.
+    pub regions: Vec<(usize, Vec<u32>)>,
 }
 
 /// A piece of cloth, ready to be built.
@@ -59,6 +62,8 @@ pub(crate) struct ColliderBody {
     pub(crate) uv: Option<Vec<[[f64; 2]; 3]>>,
     pub(crate) first_vertex: usize,
     pub(crate) motion: Motion,
+    /// Checksum of its mesh or frames, once a state has asked for it.
+    pub(crate) shape: OnceLock<u64>,
 }
 
 impl ClothBody {
@@ -159,6 +164,7 @@ impl Bodies {
             vertices: body.first_vertex..body.first_vertex + body.x.len(),
             triangles: body.mesh.triangles.clone(),
             uv: body.mesh.uv.clone(),
+            regions: body.parts.iter().filter_map(|p| Some((p.region?, p.triangles.clone()))).collect(),
         });
         let colliders = self.colliders.iter().zip(&scene.collider).map(|(body, source)| BodyInfo {
             name: source.name.clone(),
@@ -166,6 +172,7 @@ impl Bodies {
             vertices: body.first_vertex..body.first_vertex + body.motion.vertex_count(),
             triangles: body.triangles.clone(),
             uv: body.uv.clone(),
+            regions: Vec::new(),
         });
         cloth.chain(colliders).collect()
     }
@@ -203,7 +210,7 @@ fn cloth_body(
     let x: Vec<Vec3> = mesh.vertices.iter().map(|p| pose.transform_point(&(*p).into()).coords).collect();
     let parts = regions::parts(scene, assets, source, material, &mesh, &x, key)?;
     let materials: Vec<Material> =
-        if parts.is_empty() { vec![material] } else { parts.iter().map(|p| p.0).collect() };
+        if parts.is_empty() { vec![material] } else { parts.iter().map(|p| p.material).collect() };
     if materials.iter().any(|m| !matches!(m.bending, cloth_core::Bending::None)) {
         topology.require_manifold().map_err(defect)?;
     }
@@ -313,7 +320,13 @@ fn collider_body(
             return Err(scene.error(&format!("{key}.fps"), expected, "nothing"));
         };
         let motion = Motion::sequence(asset, fps, sequence, source);
-        return Ok(ColliderBody { triangles: mesh.triangles, uv: None, first_vertex, motion });
+        return Ok(ColliderBody {
+            triangles: mesh.triangles,
+            uv: None,
+            first_vertex,
+            motion,
+            shape: OnceLock::new(),
+        });
     }
     let mesh = if let Some(shape) = &source.shape {
         let (shape, tolerance) = shape.parts();
@@ -334,7 +347,7 @@ fn collider_body(
         mesh
     };
     let motion = Motion::rigid(&mesh.vertices, source);
-    Ok(ColliderBody { triangles: mesh.triangles, uv: mesh.uv, first_vertex, motion })
+    Ok(ColliderBody { triangles: mesh.triangles, uv: mesh.uv, first_vertex, motion, shape: OnceLock::new() })
 }
 
 /// Names a vertex of a body.

@@ -280,6 +280,7 @@ pub(crate) fn build(
             })
         }));
     }
+    warnings.extend(bodies.cloth.iter().flat_map(|body| body.seams.warnings.iter().cloned()));
     warnings.extend(contact.and_then(|stage| stage.continuous.lack.as_ref()).map(ToString::to_string));
     let triangles = bodies.cloth.iter().map(|c| c.mesh.triangles.len()).sum::<usize>()
         + bodies.colliders.iter().map(|c| c.triangles.len()).sum::<usize>();

@@ -5,8 +5,14 @@ use crate::{Assets, Scene, SceneError, Vec3};
 use cloth_core::Material;
 use cloth_core::mesh::TriMesh;
 
-/// A material and the triangles of it, ascending.
-pub(crate) type Part = (Material, Vec<u32>);
+/// Triangles of one material.
+pub(crate) struct Part {
+    /// Number of the region in the scene; none for what is left to the cloth's own material.
+    pub(crate) region: Option<usize>,
+    pub(crate) material: Material,
+    /// Ascending.
+    pub(crate) triangles: Vec<u32>,
+}
 
 /// The parts of a cloth: none where it is all of one material; else the cloth's own material first (unless nothing is left to
 /// it), then each region's. `x`: start positions \[m\].
@@ -23,10 +29,11 @@ pub(crate) fn parts(
         return Ok(Vec::new());
     }
     let mut part_of = vec![0_usize; mesh.triangles.len()];
-    let mut parts = vec![(own, Vec::new())];
+    let mut parts = vec![Part { region: None, material: own, triangles: Vec::new() }];
     for (i, region) in source.regions.iter().enumerate() {
         let key = format!("{key}.regions[{i}]");
-        parts.push((scene.resolve_material(&region.material, &format!("{key}.material"))?, Vec::new()));
+        let material = scene.resolve_material(&region.material, &format!("{key}.material"))?;
+        parts.push(Part { region: Some(i), material, triangles: Vec::new() });
         let corners_all = |inside: &dyn Fn(u32) -> bool| -> Vec<u32> {
             let all = |t: &u32| mesh.triangles[*t as usize].iter().all(|&v| inside(v));
             (0..mesh.triangles.len() as u32).filter(all).collect()
@@ -58,9 +65,9 @@ pub(crate) fn parts(
         }
     }
     for (t, &part) in part_of.iter().enumerate() {
-        parts[part].1.push(t as u32);
+        parts[part].triangles.push(t as u32);
     }
-    parts.retain(|(_, triangles)| !triangles.is_empty());
+    parts.retain(|part| !part.triangles.is_empty());
     Ok(parts)
 }
 

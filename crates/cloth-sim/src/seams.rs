@@ -14,7 +14,12 @@ pub(crate) struct Seams {
     pub(crate) stitches: Vec<Stitch>,
     /// Vertices that lie on each other when the seams are closed: to contact they are as one.
     pub(crate) joined: Vec<[u32; 2]>,
+    /// What may be meant otherwise.
+    pub(crate) warnings: Vec<String>,
 }
+
+/// Runs that are so many times as long as the other are warned of: even a full gather is made of less.
+const UNLIKE: f64 = 3.0;
 
 /// Builds the seams of a cloth; `x`: start positions \[m\].
 pub(crate) fn build(
@@ -38,7 +43,12 @@ pub(crate) fn build(
         let pairs = match (&seam.pairs, &seam.edges) {
             (Some(pairs), _) => listed(scene, source, pairs, mesh, &format!("{key}.pairs"))?,
             (None, Some(runs)) => {
-                let [sewn, joined] = matched(scene, source, runs, mesh, shape, &format!("{key}.edges"))?;
+                let key = format!("{key}.edges");
+                let [sewn, joined] = matched(scene, source, runs, mesh, shape, &key, &mut seams.warnings)?;
+                if sewn.iter().all(|[a, b]| a == b) {
+                    let expected = "two runs of different vertices";
+                    return Err(scene.error(&key, expected, format!("{runs:?}, the same vertices")));
+                }
                 seams.joined.extend(joined);
                 sewn
             }
@@ -89,6 +99,8 @@ fn listed(
 struct Run {
     vertices: Vec<u32>,
     share: Vec<f64>,
+    /// The whole \[m\], undeformed.
+    length: f64,
 }
 
 /// By their shares of the length: each vertex of the run with fewer vertices with the nearest of the other, and each of the
@@ -102,6 +114,7 @@ fn matched(
     mesh: &TriMesh,
     (topology, rest): (&Topology, &RestShape),
     key: &str,
+    warnings: &mut Vec<String>,
 ) -> Result<[Vec<[u32; 2]>; 2], SceneError> {
     let boundary = boundary_lengths(mesh, topology, rest);
     let run = |which: usize| -> Result<Run, SceneError> {
@@ -110,6 +123,13 @@ fn matched(
         along(scene, source, &runs[which], &boundary, &key)
     };
     let (first, second) = (run(0)?, run(1)?);
+    let (a, b) = (first.length, second.length);
+    if a.max(b) > UNLIKE * a.min(b) {
+        warnings.push(format!(
+            "{key}: the runs of \"{}\" are {a:.3} m and {b:.3} m long: the longer will lie in folds",
+            source.name
+        ));
+    }
     let swap = second.vertices.len() < first.vertices.len();
     let (few, many) = if swap { (&second, &first) } else { (&first, &second) };
     Ok([nearest(few, many), nearest(many, few)])
@@ -172,8 +192,11 @@ fn along(
         return Err(scene.error(key, expected, format!("vertex {twice} twice")));
     }
     let whole = length[length.len() - 1];
+    if vertices.len() < 2 {
+        return Err(scene.error(key, "a run to another vertex", format!("{stations:?}")));
+    }
     let share = length.iter().map(|l| l / whole).collect();
-    Ok(Run { vertices, share })
+    Ok(Run { vertices, share, length: whole })
 }
 
 /// The shorter way along the boundary from `from` to `to` (Dijkstra; of equal ways that by lower vertices), without `from`: each

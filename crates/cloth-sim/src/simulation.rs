@@ -371,7 +371,7 @@ fn cloth_parts(body: &ClothBody) -> Vec<ClothPart<'_>> {
     if body.parts.is_empty() {
         return vec![part(&body.material, None)];
     }
-    body.parts.iter().map(|(material, triangles)| part(material, Some(triangles.as_slice()))).collect()
+    body.parts.iter().map(|p| part(&p.material, Some(p.triangles.as_slice()))).collect()
 }
 
 fn thread_pool(threads: Option<usize>) -> Result<rayon::ThreadPool, SimError> {

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from clothsim._export.writers import FORMATS, write
+from clothsim._files import output_error
 from clothsim._run.start import load_run
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
@@ -33,7 +34,10 @@ def execute(options: argparse.Namespace) -> int:
     """Write each format, and say where."""
     recording = load_run(options.run)
     folder = options.to or (options.run if options.run.is_dir() else options.run.parent)
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise output_error(folder, error) from error
     written: list[Path] = []
     for name in dict.fromkeys(options.formats):
         if not (options.quiet or options.json):

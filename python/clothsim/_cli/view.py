@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     look.add_argument(
         "--limit", metavar="MB", type=_positive, default=40.0, help="largest page; frames are left out for it"
     )
-    look.add_argument("--quiet", action="store_true", help="no progress on stderr")
+    look.add_argument("-q", "--quiet", action="store_true", help="no progress and no notes on stderr")
 
 
 def execute(options: argparse.Namespace) -> int:

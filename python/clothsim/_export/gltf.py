@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clothsim._arrays import Ints
-from clothsim._export.usd import body_colour, vertex_normals
+from clothsim._export.limits import check_float32
+from clothsim._export.usd import body_colour, region_colour, triangles_in_no_region, vertex_normals
 from clothsim._files import write_whole
 from clothsim.errors import InvalidInput
 from clothsim.recording import Body, Recording
@@ -31,15 +33,18 @@ def write(recording: Recording, path: Path) -> None:
     """Write the file, whole or not at all.
 
     Vertices keep the body's order; those with several UV values (a seam) are repeated after the last one. v is flipped,
-    as glTF counts it from the top of the picture.
+    as glTF counts it from the top of the picture. Regions are primitives of a mesh that share its vertices, each with a
+    material of its own.
 
     Raises
     ------
     InvalidInput
-        The recording has no frames, or needs more than the 4 GiB that a GLB can hold.
+        The recording has no frames, no bodies or coordinates beyond float32, or needs more than the 4 GiB of a GLB.
     """
-    if not len(recording):
-        raise InvalidInput("recording: expected at least one frame to write glTF, got none", name="recording")
+    for what, count in (("frame", len(recording)), ("body", len(recording.bodies))):
+        if not count:
+            raise InvalidInput(f"recording: expected at least one {what} to write glTF, got none", name="recording")
+    check_float32(recording, "glTF")
     vertices = sum(_split(body)[1].size * (1 if body.static else len(recording)) for body in recording.bodies)
     if 24 * vertices > _LARGEST:
         raise InvalidInput(
@@ -95,7 +100,6 @@ class _Document:
         }
         times: int | None = None
         for number, body in enumerate(recording.bodies):
-            self.json["materials"].append(_material(body, number))
             targets = 0 if body.static else len(recording) - 1
             self.json["meshes"].append(self._mesh(recording, body, number, targets))
             if targets:
@@ -125,22 +129,27 @@ class _Document:
         }
         if uv is not None:
             attributes["TEXCOORD_0"] = self._array(uv, "VEC2", target=_VERTICES)
-        primitive: dict[str, Any] = {
-            "attributes": attributes,
-            "indices": self._array(triangles.astype(np.uint32).reshape(-1), "SCALAR", target=_INDICES),
-            "material": number,
-        }
-        mesh: dict[str, Any] = {"name": body.name, "primitives": [primitive]}
+        morphs: dict[str, Any] = {}
         if targets:
-            primitive["targets"] = []
+            morphs["targets"] = []
             for frame in range(1, targets + 1):
                 x, n = self._state(recording, body, frame, origin)
-                primitive["targets"].append(
+                morphs["targets"].append(
                     {
                         "POSITION": self._array(x - base, "VEC3", target=_VERTICES, bounds=True),
                         "NORMAL": self._array(n - normals, "VEC3", target=_VERTICES),
                     }
                 )
+        mesh: dict[str, Any] = {"name": body.name, "primitives": []}
+        for name, colour, own in _parts(body, number):
+            primitive = {
+                "attributes": attributes,
+                "indices": self._array(triangles[own].astype(np.uint32).reshape(-1), "SCALAR", target=_INDICES),
+                "material": len(self.json["materials"]),
+            }
+            self.json["materials"].append(_material(name, colour, two_sided=body.kind == "cloth"))
+            mesh["primitives"].append({**primitive, **morphs})
+        if targets:
             mesh["weights"] = [0.0] * targets
         return mesh
 
@@ -186,11 +195,20 @@ class _Document:
         return len(self._accessors) - 1
 
 
-def _material(body: Body, number: int) -> dict[str, Any]:
+def _parts(body: Body, number: int) -> Iterator[tuple[str, tuple[float, float, float], Ints]]:
+    """Name, colour and triangles of what is of the body's own material, if anything is, and of each region."""
+    own = triangles_in_no_region(body)
+    if own.size or not body.regions:
+        yield body.name, body_colour(body, number), own
+    for region, (name, triangles) in enumerate(body.regions.items(), start=1):
+        yield f"{body.name} {name}", region_colour(body, number, region), triangles
+
+
+def _material(name: str, colour: tuple[float, float, float], *, two_sided: bool) -> dict[str, Any]:
     return {
-        "name": body.name,
+        "name": name,
         "pbrMetallicRoughness": {
-            "baseColorFactor": [*body_colour(body, number), 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.8,
+            "baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.8,
         },
-        "doubleSided": body.kind == "cloth",
+        "doubleSided": two_sided,
     }  # fmt: skip

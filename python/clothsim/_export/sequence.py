@@ -23,5 +23,5 @@ def write(recording: Recording, folder: Path, suffix: str, *, overwrite: bool = 
         for body, stem in zip(recording.bodies, unique_stems(b.name for b in recording.bodies), strict=True):
             for frame in range(1 if body.static else count):
                 path = part / f"{stem if body.static else frame_name(stem, frame, count)}.{suffix}"
-                mesh = RawMesh(recording.positions(body, frame), body.triangles, body.uv)
+                mesh = RawMesh(recording.positions(body, frame), body.triangles, body.uv, body.regions)
                 path.write_bytes(_formats.write(path, mesh))

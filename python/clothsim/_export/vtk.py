@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -14,6 +15,9 @@ from clothsim._files import whole_folder
 from clothsim.recording import Body, Recording
 
 __all__ = ["write"]
+
+# What XML cannot hold, not even escaped.
+_CONTROL = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 def write(recording: Recording, folder: Path, *, overwrite: bool = False) -> None:
@@ -41,7 +45,7 @@ def write(recording: Recording, folder: Path, *, overwrite: bool = False) -> Non
                         surface.point_data["velocity"] = velocities
                     (part / name).write_bytes(_bytes(surface))
                 time = repr(float(recording.times[frame]))
-                label = quoteattr(body.name)
+                label = quoteattr(_CONTROL.sub("\N{REPLACEMENT CHARACTER}", body.name))
                 entries.append(f'<DataSet timestep="{time}" part="{number}" name={label} file="{name}"/>')
         lines = [
             '<?xml version="1.0"?>',

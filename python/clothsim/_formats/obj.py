@@ -18,6 +18,8 @@ from clothsim.errors import MeshError
 
 __all__ = ["dump", "parse"]
 
+# What the format calls the group of faces in none; a "g" without names is not understood everywhere.
+_NO_GROUP = "default"
 # Lines that name many groups before many faces ask for room of the product: ten groups of a million faces each.
 _MOST_MEMBERS = 10_000_000
 
@@ -26,7 +28,7 @@ def parse(content: bytes, name: str) -> RawMesh:
     """Parse the text of an OBJ file; ``name`` is for messages. Normals and lines are passed over.
 
     UV is given only if every corner of every face names one. Groups are what ``g`` (several names at once), ``o`` and
-    ``usemtl`` say of the faces after them.
+    ``usemtl`` say of the faces after them; the group ``default`` is that of faces in none.
     """
     vertices: list[tuple[float, float, float]] = []
     coordinates: list[tuple[float, float]] = []
@@ -53,7 +55,7 @@ def parse(content: bytes, name: str) -> RawMesh:
                     members.setdefault(group, []).append(len(faces))
                 faces.append(_face(words[1:], len(vertices), len(coordinates)))
             elif words[0] == "g":
-                current["g"] = words[1:]
+                current["g"] = [word for word in words[1:] if word != _NO_GROUP]
             elif words[0] in ("o", "usemtl"):
                 current[words[0]] = [line.split(maxsplit=1)[1].strip()] if len(words) > 1 else []
         except (ValueError, IndexError) as error:
@@ -122,7 +124,8 @@ def _triangles(
 def dump(mesh: RawMesh) -> bytes:
     """Text of an OBJ file; numbers read back to the same float64. Equal UV of corners are written once.
 
-    Groups become ``g`` lines; blanks in their names, which part names there, become ``_``.
+    Groups become ``g`` lines; blanks in their names, which part names there, become ``_``. Triangles in no group are in
+    ``default``.
     """
     out = BytesIO()
     _rows(out, b"v ", mesh.vertices)
@@ -138,10 +141,11 @@ def dump(mesh: RawMesh) -> bytes:
         names: list[list[str]] = [[] for _ in lines]
         for name, members in mesh.groups.items():
             for triangle in members.tolist():
-                names[triangle].append("_".join(name.split()) or "_")
+                word = "_".join(name.split()) or "_"
+                names[triangle].append("default_" if word == _NO_GROUP else word)
         for t in range(len(lines)):
             if t == 0 or names[t] != names[t - 1]:
-                out.write(("g " + " ".join(names[t])).rstrip().encode() + b"\n")
+                out.write(("g " + " ".join(names[t] or [_NO_GROUP])).encode() + b"\n")
             out.write(lines[t])
         return out.getvalue()
     out.writelines(lines)

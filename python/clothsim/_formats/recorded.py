@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -30,6 +30,7 @@ class RecordedBody:
     uv: Floats | None
     static: bool
     rest: Literal["uv", "start"] | Floats | None = None
+    regions: Mapping[str, Ints] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,8 @@ def read(path: Path) -> Recorded:
     OSError
         It cannot be read.
     """
+    if path.exists() and not path.is_file():
+        raise ValueError("it is no file")  # a pipe or device need not end
     with Archive(path) as data:
         meta = _meta(data)
         times = floats(data["times"], "times", "shape (frames,)")
@@ -112,6 +115,9 @@ def _meta(data: Archive) -> Mapping[str, Any]:
                 if entry.get("rest") not in (None, "uv", "start", "array"):
                     got = str(entry["rest"])[:200]
                     raise ValueError(f"meta: bodies[{at}]: rest: expected uv, start, array or none, got {got}")
+                regions = entry.get("regions", [])
+                if not isinstance(regions, list) or not all(isinstance(region, str) for region in regions):
+                    raise ValueError(f"meta: bodies[{at}]: regions: expected names, got {str(regions)[:200]}")
             case _:
                 raise ValueError(
                     f"meta: bodies[{at}]: expected name, kind, vertex_count, triangle_count, static and uv, "
@@ -161,6 +167,20 @@ def _cloths(data: Archive, entries: list[Mapping[str, Any]]) -> list[RecordedBod
             if rest.shape != (m, 3, 2) or not np.isfinite(rest).all():
                 raise ValueError(f"{name}: expected finite numbers of shape {(m, 3, 2)}, got shape {rest.shape}")
         own_uv = uv[row : row + m] if uv is not None and entry["uv"] else None
-        bodies.append(RecordedBody(entry["name"], "cloth", n, own, own_uv, False, rest))
+        regions = _regions(data, f"regions_{len(bodies)}", entry.get("regions", []), m)
+        bodies.append(RecordedBody(entry["name"], "cloth", n, own, own_uv, False, rest, regions))
         vertex, row = vertex + n, row + m
     return bodies
+
+
+def _regions(data: Archive, name: str, names: list[str], triangles: int) -> dict[str, Ints]:
+    """Triangles of each region of a cloth, by its name."""
+    if not names:
+        return {}
+    region_of = indices(data[name], name)
+    if region_of.shape != (triangles,) or (
+        region_of.size and not -1 <= region_of.min() <= region_of.max() < len(names)
+    ):
+        expected = f"shape {(triangles,)} and regions in −1..{len(names)}"
+        raise ValueError(f"{name}: expected {expected}, got shape {region_of.shape}")
+    return {region: np.flatnonzero(region_of == number) for number, region in enumerate(names)}

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import Any
 
 import numpy as np
 
 from clothsim.scene import Scene
 
-__all__ = ["array_digest", "digest"]
+__all__ = ["digest"]
 
 
 def digest(scene: Scene) -> str:
     """Fingerprint of a scene and all its arrays."""
-    return _with_arrays(hashlib.sha256(scene.check().to_json().encode()), scene)
-
-
-def array_digest(scene: Scene) -> str:
-    """Fingerprint of the arrays alone."""
-    return _with_arrays(hashlib.sha256(), scene)
-
-
-def _with_arrays(sha: Any, scene: Scene) -> str:
+    sha = hashlib.sha256(scene.check().to_json().encode())
     for group in scene.assets():
         for name, arrays in sorted(group.items()):
             sha.update(name.encode())

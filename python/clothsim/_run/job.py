@@ -15,7 +15,7 @@ import numpy as np
 from clothsim._device import check_device
 from clothsim._frames import frame_lengths, moving_positions, standing_positions
 from clothsim._progress import progress_bar
-from clothsim._run.digests import array_digest, digest
+from clothsim._run.digests import digest
 from clothsim._run.facts import FrameFacts
 from clothsim._run.folder import RunFolder
 from clothsim._run.frames import FrameWriter
@@ -355,8 +355,7 @@ class Job:
 
     def _states(self, folder: RunFolder, fingerprint: str, last: int) -> StateWriter:
         every = int(self.scene.output["states"])
-        facts = {"scene": self.scene.name, "digest": fingerprint, "arrays": array_digest(self.scene)} if every else {}
-        return StateWriter(folder.out, folder.work, every, last, facts)
+        return StateWriter(folder.out, folder.work, every, last, {"scene": self.scene.name, "digest": fingerprint})
 
     def _writer(self, folder: RunFolder, simulation: Simulation, keep: int) -> FrameWriter:
         """The frames in the work folder: rows of what moves, then velocities if they are kept."""

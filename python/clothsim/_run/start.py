@@ -14,8 +14,7 @@ import numpy as np
 from clothsim import _core
 from clothsim._arrays import Floats
 from clothsim._device import check_device, check_threads
-from clothsim._run.digests import array_digest
-from clothsim._run.states import frame_count, read_state, states_of
+from clothsim._run.states import FOLDER, frame_count, promised, read_state, states_of
 from clothsim.errors import InvalidInput
 from clothsim.recording import Body, Recording, flattened
 from clothsim.scene import Scene
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Start", "load_run"]
 
 _logger = logging.getLogger(__name__)
+_WITHOUT = "without its state (--no-state, state=False) it goes on with positions and velocities alone"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +42,8 @@ class Start:
         The recording has no velocities: these are differences of positions.
     state : bytes or None
         The full state, which then has positions and velocities too: those above are empty.
-    arrays : str or None
-        Fingerprint of the arrays of the scene that the state was written under, where it is known.
+    cloths : sequence of Body
+        The cloths of the recording that positions and velocities were taken from.
     """
 
     time: float
@@ -51,7 +51,7 @@ class Start:
     velocities: Floats
     estimated: bool
     state: bytes | None = None
-    arrays: str | None = None
+    cloths: tuple[Body, ...] = ()
 
     @classmethod
     def of(cls, recording: Recording, scene: Scene, frame: int = -1, *, asked: bool = False) -> Start:
@@ -103,7 +103,7 @@ class Start:
             )
         return cls(
             float(recording.times[at]), np.concatenate(positions), np.concatenate(velocities),
-            not recording.has_velocities,
+            not recording.has_velocities, cloths=tuple(known[name] for name in names),
         )  # fmt: skip
 
     @classmethod
@@ -117,7 +117,7 @@ class Start:
         """
         header, state = read_state(path)
         none = np.zeros((0, 3))
-        return cls(float(header["time"]), none, none, estimated=False, state=state, arrays=header.get("arrays"))
+        return cls(float(header["time"]), none, none, estimated=False, state=state)
 
     @classmethod
     def of_run(cls, run: Path, scene: Scene, frame: int | None = None, *, state: bool = True) -> Start:
@@ -141,25 +141,51 @@ class Start:
         states = states_of(run) if state else {}
         if states:
             return cls.of_state(states[_frame_with_state(run, states, frame)])
+        if state and promised(run):
+            expected = "the states that the run's report speaks of"
+            raise InvalidInput(f"{run / FOLDER}: expected {expected}, got nothing; {_WITHOUT}", name="state")
         return cls.of(load_run(run), scene, -1 if frame is None else frame, asked=not state)
 
     def begin(self, scene: Scene, threads: int | None, device: str, allow: bool) -> _core.Simulation:
-        """Build the engine of ``scene`` from here on."""
+        """Build the engine of ``scene`` from here on.
+
+        Raises
+        ------
+        InvalidInput
+            A cloth of the scene has another mesh than in the recording.
+        """
         scene_core, assets = scene.check(), scene.assets()
         options = (check_threads(threads), check_device(device), allow)
         if self.state is None:
             begin = (self.time, np.ascontiguousarray(self.positions), np.ascontiguousarray(self.velocities))
-            return _core.Simulation(scene_core, *assets, *options, begin)
+            try:
+                core = _core.Simulation(scene_core, *assets, *options, begin)
+            except InvalidInput as error:
+                if error.name == "positions":  # other numbers of vertices: whose?
+                    self._check_cloths(_core.Simulation(scene_core, *assets, *options[:2], True, None))
+                raise
+            self._check_cloths(core)
+            return core
         core = _core.Simulation.continue_from(self.state, scene_core, *assets, *options)
         continued = json.loads(core.summary())["continued"]
-        edited = continued["edited"]
-        if self.arrays is not None and self.arrays != array_digest(scene):
-            edited = [*edited, "the arrays of its meshes"]
-        text = f"; edited since: {', '.join(edited)}" if edited else ", to the same bits"
+        text = f"; edited since: {', '.join(continued['edited'])}" if continued["edited"] else ", to the same bits"
         _logger.info("going on from the full state at %g s%s", self.time, text)
         if continued["anew"]:
             _logger.warning("at %g s begin anew: %s", self.time, "; ".join(continued["anew"]))
         return core
+
+    def _check_cloths(self, core: _core.Simulation) -> None:
+        """Refuse an engine whose cloths have other meshes than those of the recording."""
+        for was, (name, _, (first, last), (_, triangles, _)) in zip(self.cloths, core.bodies(), strict=False):
+            expected = got = ""
+            if last - first != was.vertex_count:
+                expected, got = f"the {was.vertex_count} vertices that it has in the recording", f"{last - first}"
+            elif not np.array_equal(triangles, was.triangles):
+                expected, got = "the triangles that it has in the recording", "other triangles"
+            if expected:
+                raise InvalidInput(
+                    f"cloth {name!r}: expected {expected}, got {got}", name="recording", expected=expected, got=got
+                )
 
     def undeformed(self, simulation: Simulation) -> list[Body]:
         """Bodies of a simulation that began here: cloth whose undeformed shape no frame shows knows it itself."""
@@ -207,9 +233,8 @@ def _frame_with_state(run: Path, states: dict[int, Path], frame: int | None) -> 
         near = [max((f for f in states if f < at), default=None), min((f for f in states if f > at), default=None)]
         expected = f"a frame with a state, the nearest {' and '.join(str(f) for f in near if f is not None)}"
         raise InvalidInput(
-            f"frame: expected {expected}, got {frame}; without its state (--no-state, state=False) it goes on with "
-            "positions and velocities alone", name="frame", expected=expected, got=str(frame),
-        )  # fmt: skip
+            f"frame: expected {expected}, got {frame}; {_WITHOUT}", name="frame", expected=expected, got=str(frame)
+        )
     return at
 
 

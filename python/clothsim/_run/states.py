@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import zlib
 from pathlib import Path
@@ -18,12 +19,13 @@ from clothsim._files import output_error, whole
 from clothsim._run.sealed import read_sealed, write_sealed
 from clothsim.errors import CheckpointError
 
-__all__ = ["FOLDER", "StateWriter", "frame_count", "read_state", "states_of"]
+__all__ = ["FOLDER", "StateWriter", "frame_count", "promised", "read_state", "states_of"]
 
 FOLDER = "states"
 _WHAT = "the state of a frame"
 # Unpacked, a state is at most so many times its file: what shrinks more is kept as it is.
 _MOST = 64
+_NUMBER = "[0-9]{6,18}"  # of a frame, in the name of a file
 
 
 class StateWriter:
@@ -102,15 +104,27 @@ def states_of(run: Path) -> dict[int, Path]:
     return _listed(run / FOLDER) or _listed(run / ".clothsim" / FOLDER)
 
 
+def promised(run: Path) -> bool:
+    """Whether the report of a run says that it has kept states."""
+    return bool(_reported(run, "states"))
+
+
 def frame_count(run: Path) -> int | None:
     """Frames of a run: finished, or on its way; None where that is not known."""
-    try:
-        return int(json.loads((run / "report.json").read_bytes())["frame_count"])
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
+    count = _reported(run, "frame_count")
+    if isinstance(count, int):
+        return count
     try:
         return (run / ".clothsim" / "frames.jsonl").read_bytes().count(b"\n")
     except OSError:
+        return None
+
+
+def _reported(run: Path, key: str) -> Any:
+    """What a run's report says; None where there is none, or it cannot be read."""
+    try:
+        return json.loads((run / "report.json").read_bytes())[key]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
@@ -165,5 +179,5 @@ def _name(frame: int) -> str:
 
 
 def _listed(folder: Path) -> dict[int, Path]:
-    found = {int(path.stem): path for path in folder.glob("*.state") if path.stem.isdigit()}
+    found = {int(path.stem): path for path in folder.glob("*.state") if re.fullmatch(_NUMBER, path.stem)}
     return dict(sorted(found.items()))

@@ -15,11 +15,15 @@ from clothsim._run.folder import RunFolder
 from clothsim._run.frames import frames_so_far
 from clothsim._run.sealed import read_sealed as read_checkpoint
 from clothsim._scene_facts import contact_thickness
+from clothsim._view import report
 from clothsim.errors import CheckpointError, InvalidInput
 from clothsim.recording import Recording
 from clothsim.simulation import Simulation
 
 __all__ = ["Source"]
+
+# Largest coordinate that is drawn [m]: products of such lengths are float32 numbers.
+_FARTHEST = 1e12
 
 
 @dataclass
@@ -59,12 +63,16 @@ class Source:
         Raises
         ------
         InvalidInput
-            The run kept no frames.
+            The run kept no frames, or what is in them cannot be drawn.
         """
         if self.recording is None:
             raise _wrong(self.path, "a run with frames", self._missing)
         if len(self.recording) == 0:
             raise _wrong(self.path, "a run with frames", "a recording of none")
+        if not any(body.vertex_count for body in self.recording.bodies):
+            raise _wrong(self.path, "a run with bodies", "a recording of none")
+        if (reach := self.recording.reach()) > _FARTHEST:
+            raise _wrong(self.path, f"coordinates up to {_FARTHEST:g} m", f"{reach:g} m")
         return self.recording
 
     def frame_number(self, asked: int | None) -> int | None:
@@ -113,12 +121,10 @@ class Source:
         recording = Recording.load(frames) if frames.exists() else None
         source = cls(path, recording, _missing="one with output.npz = false")
         try:
-            report = json.loads((path / "report.json").read_bytes())
-            source.facts, source.effects = list(report["frames"]), list(report["effects"])
-            error = report["error"]
+            source.facts, source.effects, error = report.read(path / "report.json")
         except FileNotFoundError:
             source.notices.append("report.json is missing: no plots")
-        except (ValueError, KeyError, TypeError, OSError) as problem:
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OSError) as problem:
             source.notices.append(f"report.json cannot be read ({type(problem).__name__}): no plots")
         else:
             if error:

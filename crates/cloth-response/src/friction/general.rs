@@ -235,6 +235,7 @@ impl Kernel for General {
         self.laws[state.law as usize].mu_s
     }
 
+    #[inline]
     fn bound(&self, state: &mut Sliding, stop: Vec3, lambda: f64, mass: f64) -> Vec3 {
         let (needed, threshold) = (stop.norm(), self.laws[state.law as usize].mu_s * lambda);
         if !state.broken {

@@ -237,13 +237,7 @@ fn new_contact<S: Copy>(
         },
         distance: l1,
     };
-    let law = NormalLaw {
-        least: f64::NEG_INFINITY,
-        spring: 0.0,
-        on_top: false,
-        rubs: false,
-        cap: f64::NEG_INFINITY,
-    };
+    let law = NormalLaw::inelastic(f64::NEG_INFINITY);
     Contact::new(&stencil, motion.inv_mass, law, friction)
 }
 

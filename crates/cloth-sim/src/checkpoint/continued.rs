@@ -11,21 +11,20 @@
 //! Cloths keep their names, order and triangles.
 
 use super::bytes::{Kind, Reader, Room, Writer, checksum, invalid, open, seal};
+use super::named::{Named, covers, differences, named};
 use crate::bodies::{Bodies, ClothBody};
 use crate::ledger::Ledger;
 use crate::pins::PinSet;
+use crate::regions::Part;
 use crate::scene::ContactMethod;
 use crate::step::State;
 use crate::{Assets, Scene, SimError, Simulation, SimulationOptions, Vec3};
 use cloth_response::{Side, Sides};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-const STATE: Kind = Kind { magic: *b"CLOTHSTA", version: 1, name: "the state of a frame" };
-/// Keys of a scene that are no matter of the motion.
-const OUTWARD: [&str; 3] = ["name", "duration", "output"];
+const STATE: Kind = Kind { magic: *b"CLOTHSTA", version: 2, name: "the state of a frame" };
 /// Differences that are listed.
 const LISTED: usize = 32;
 /// A pin stands where the state has its vertex but for rounding up to this distance [m].
@@ -40,16 +39,6 @@ pub struct Continued {
     pub edited: Vec<String>,
     /// What began anew, in words, beside the account of energy; with nothing edited, nothing.
     pub anew: Vec<String>,
-}
-
-/// A body as a state names it.
-struct Named {
-    name: String,
-    vertices: usize,
-    /// Of its triangles.
-    topology: u64,
-    /// Of a cloth's undeformed shape.
-    rest: u64,
 }
 
 struct Saved {
@@ -67,13 +56,13 @@ impl Simulation {
     pub fn frame_state(&self) -> Vec<u8> {
         let mut payload = Writer::default();
         payload.text(&serde_json::to_string(&self.scene).unwrap_or_default());
-        for list in named(&self.scene, &self.bodies) {
+        for list in named(&self.scene, &self.assets, &self.bodies) {
             payload.u64(list.len() as u64);
             for body in list {
                 payload.text(&body.name);
                 payload.u64(body.vertices as u64);
                 payload.u64(body.topology);
-                payload.u64(body.rest);
+                payload.u64(body.shape);
             }
         }
         payload.state(&self.state);
@@ -105,10 +94,10 @@ impl Simulation {
         let saved = Saved::read(bytes)?;
         scene.check()?;
         let bodies = Bodies::new(scene, &assets)?;
-        let now = named(scene, &bodies);
+        let now = named(scene, &assets, &bodies);
         saved.check_cloth(scene, &now[0])?;
         let mut continued =
-            Continued { time: saved.state.time, edited: saved.edits(scene, &now[0]), anew: Vec::new() };
+            Continued { time: saved.state.time, edited: saved.edits(scene, &now), anew: Vec::new() };
         let kept = saved.kept_colliders(&bodies, &now[1]);
         for (body, kept) in now[1].iter().zip(&kept) {
             if kept.is_none() {
@@ -172,7 +161,7 @@ impl Simulation {
                 .and_then(|v| self.bodies.cloth.iter().find(|body| range_of(body).contains(&(*v as usize))));
             if let Some(body) = cloth {
                 bytes.extend(format!("{:?}", body.material.bending).bytes());
-                for (material, triangles) in &body.parts {
+                for Part { material, triangles, .. } in &body.parts {
                     bytes.extend(format!("{:?} {triangles:?}", material.bending).bytes());
                 }
             }
@@ -191,7 +180,7 @@ impl Saved {
             let count = payload.count(32)?;
             let mut body = || {
                 let (name, vertices) = (payload.text()?, payload.u64()? as usize);
-                Ok(Named { name, vertices, topology: payload.u64()?, rest: payload.u64()? })
+                Ok(Named { name, vertices, topology: payload.u64()?, shape: payload.u64()?, source: "" })
             };
             (0..count).map(|_| body()).collect::<Result<Vec<_>, SimError>>()
         };
@@ -248,17 +237,20 @@ impl Saved {
         Ok(())
     }
 
-    /// Keys of what is other in `scene`.
-    fn edits(&self, scene: &Scene, cloth: &[Named]) -> Vec<String> {
+    /// Keys of what is other in `scene`, and of meshes and animations that have other vertices under the same name.
+    fn edits(&self, scene: &Scene, now: &[Vec<Named>; 2]) -> Vec<String> {
         let mut edited = Vec::new();
         let [was, is] = [&self.scene, scene].map(|s| serde_json::to_value(s).unwrap_or_default());
         differences("", &was, &is, &mut edited);
-        for (i, (was, is)) in self.cloth.iter().zip(cloth).enumerate() {
-            if was.rest != is.rest {
-                edited.push(format!("cloth[{i}].mesh"));
+        for (table, was, is) in [("cloth", &self.cloth, &now[0]), ("collider", &self.colliders, &now[1])] {
+            for (i, is) in is.iter().enumerate() {
+                let other = |was: &Named| was.name == is.name && was.shape != is.shape;
+                let key = format!("{table}[{i}].{}", is.source);
+                if was.iter().any(other) && !edited.iter().any(|listed| covers(listed, &key)) {
+                    edited.push(key);
+                }
             }
         }
-        edited.dedup();
         edited.truncate(LISTED);
         edited
     }
@@ -370,56 +362,4 @@ fn place_pins(
 
 fn range_of(body: &ClothBody) -> Range<usize> {
     body.first_vertex..body.first_vertex + body.x.len()
-}
-
-/// Cloths, then colliders.
-fn named(scene: &Scene, bodies: &Bodies) -> [Vec<Named>; 2] {
-    let words = |triangles: &[[u32; 3]]| -> Vec<u8> {
-        triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect()
-    };
-    let cloth = (scene.cloth.iter().zip(&bodies.cloth)).map(|(source, body)| Named {
-        name: source.name.clone(),
-        vertices: body.x.len(),
-        topology: checksum(&words(&body.mesh.triangles)),
-        rest: checksum(
-            &body.rest.inverse.iter().flatten().flatten().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>(),
-        ),
-    });
-    let colliders = (scene.collider.iter().zip(&bodies.colliders)).map(|(source, body)| Named {
-        name: source.name.clone(),
-        vertices: body.motion.vertex_count(),
-        topology: checksum(&words(&body.triangles)),
-        rest: 0,
-    });
-    [cloth.collect(), colliders.collect()]
-}
-
-/// Keys below `key` that are other.
-fn differences(key: &str, was: &Value, is: &Value, list: &mut Vec<String>) {
-    if was == is {
-        return;
-    }
-    match (was, is) {
-        (Value::Object(was), Value::Object(is)) => {
-            let names: std::collections::BTreeSet<&String> = was.keys().chain(is.keys()).collect();
-            for name in names {
-                if key.is_empty() && OUTWARD.contains(&name.as_str()) {
-                    continue;
-                }
-                let below = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-                differences(
-                    &below,
-                    was.get(name).unwrap_or(&Value::Null),
-                    is.get(name).unwrap_or(&Value::Null),
-                    list,
-                );
-            }
-        }
-        (Value::Array(was), Value::Array(is)) if was.len() == is.len() && is.iter().any(Value::is_object) => {
-            for (i, (was, is)) in was.iter().zip(is).enumerate() {
-                differences(&format!("{key}[{i}]"), was, is, list);
-            }
-        }
-        _ => list.push(key.into()),
-    }
 }

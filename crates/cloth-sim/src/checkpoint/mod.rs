@@ -6,6 +6,7 @@
 
 mod bytes;
 mod continued;
+mod named;
 
 use crate::pace::Pending;
 use crate::{Report, Scene, SimError, Simulation, SimulationOptions};

@@ -1,6 +1,7 @@
 //! A step that fails, and what it leaves.
 
 use super::touches;
+use crate::auto_step::FIRST;
 use crate::ledger::Ledger;
 use crate::{Assets, Scene, SimError, Simulation, SimulationOptions, Vec3};
 use std::ops::ControlFlow;
@@ -378,6 +379,34 @@ fn what_runs_away_stands_still_where_it_was() {
     free.state.v[0].y += 1e-4;
     free.step().unwrap();
     assert_ne!(free.state.x, x, "without the loss it moves");
+}
+
+/// With steps chosen by their error what stands still does so for as long as a step was tried first: stretches of the size tried
+/// last, each half of the one before, would come to no end.
+#[test]
+fn what_stands_still_does_so_in_steps_that_do_not_shrink() {
+    let mut sim = landing_among("dt = \"auto\"\ndt_tolerance = 100.0\ndt_max = 0.0166", "", "", true);
+    while sim.time() < 0.6 {
+        sim.step().unwrap();
+    }
+    assert!(touches(&sim.state) && sim.state.pace.ledger.open, "it lies on the floor");
+    let (x, time) = (sim.state.x.clone(), sim.time());
+    // A joule less than there is: whatever the step, it seems to have made one.
+    let ledger = sim.state.pace.ledger;
+    sim.state.pace.ledger =
+        Ledger { open: true, level: ledger.level - 1.0, base: ledger.base - 1.0, scale: 0.0 };
+    let steps = 20_u32;
+    for _ in 0..steps {
+        sim.step().unwrap();
+        assert_eq!(sim.state.x, x, "it stands");
+    }
+    let least = 0.99 * FIRST * f64::from(steps - 1);
+    let passed = sim.time() - time;
+    assert!(passed > least, "{passed} s in {steps} steps");
+    // The sizes tried last, for which it must not stand, are far less.
+    let report = sim.report();
+    let tried_last = report.steps.iter().rev().take(steps as usize).map(|s| s.smallest_dt).sum::<f64>();
+    assert!(tried_last > 0.0 && tried_last < 0.1 * least, "{tried_last} s of {least}");
 }
 
 /// A flag held by two corners in wind; they move up, if anything.
