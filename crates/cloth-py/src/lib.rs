@@ -17,14 +17,23 @@ mod simulation;
 
 use pyo3::prelude::*;
 
-/// Gives memory that a call has freed less than a second ago to the next call without a fault per page, on every thread;
+/// Gives memory that a call has freed less than [`KEPT`] ago to the next call without a fault per page, on every thread;
 /// Python's own stays as it is.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
+/// How long freed memory is kept before the system gets it back [ms]: detections of a script lie seconds apart.
+const KEPT: std::ffi::c_long = 60_000;
+
+/// `mi_option_purge_delay` of `mimalloc.h`, which the bindings do not name.
+const PURGE_DELAY: libmimalloc_sys::mi_option_t = 15;
+
 /// The compiled half of clothsim. Private: use the package.
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    // SAFETY: the option exists in every version that the bindings compile, and may be set at any time.
+    unsafe { libmimalloc_sys::mi_option_set(PURGE_DELAY, KEPT) };
+
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("BUILD_PROFILE", if cfg!(debug_assertions) { "debug" } else { "release" })?;
 
