@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import logging
 import os
 import signal
 import subprocess
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -228,6 +230,25 @@ def test_a_scheduler_that_does_not_answer(tmp_path: Path, monkeypatch: pytest.Mo
         with pytest.raises(cs.ClusterError, match=f"scheduler {address}: no answer within 0.3 s"):
             cs.sweep.run_file(path, scheduler=address, out=tmp_path / "out", progress=False)
         assert not (tmp_path / "out").exists()
+
+
+def test_a_client_that_has_failed_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is left of it is collected in any thread, also while the loop of the next client starts under this lock."""
+    from distributed.utils import LoopRunner
+
+    monkeypatch.setattr(cluster, "_ANSWER", 0.3)
+    for address in ("tcp://127.0.0.1:9", "nowhere:nothing", "http://"):
+        gc.disable()
+        try:
+            with pytest.raises(cs.ClusterError):
+                cluster.RemoteCluster(address)
+            collector = threading.Thread(target=gc.collect, daemon=True)
+            with LoopRunner._lock:
+                collector.start()
+                collector.join(5)
+                assert not collector.is_alive()
+        finally:
+            gc.enable()
 
 
 def test_a_scheduler_that_goes_in_mid_run(tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:

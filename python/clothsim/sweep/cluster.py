@@ -53,6 +53,26 @@ class Cluster:
             self.client.close(timeout=2)
 
 
+def _client(address: str) -> Any:
+    """Connect, or let go of what was begun before the error goes on.
+
+    Left to the collector, it would be closed in any thread: in that of the next client's loop too, which would wait for
+    itself.
+    """
+    from distributed import Client
+
+    class Closing(Client):  # type: ignore[misc]  # of a package without types
+        def start(self, **options: Any) -> None:
+            try:
+                super().start(**options)
+            except BaseException:
+                with contextlib.suppress(Exception):
+                    self.close(timeout=2)
+                raise
+
+    return Closing(address, timeout=_ANSWER, set_as_default=False)
+
+
 class RemoteCluster(Cluster):
     """Somebody's cluster, by the address of its scheduler.
 
@@ -63,14 +83,12 @@ class RemoteCluster(Cluster):
     """
 
     def __init__(self, address: str) -> None:
-        from distributed import Client
-
         # A scheduler that goes is told of once, by an error of ours, not by tracebacks of each attempt to reach it.
         self._loggers = [(logger, logger.level) for logger in map(logging.getLogger, _CHATTER)]
         for logger, _ in self._loggers:
             logger.setLevel(logging.CRITICAL)
         try:
-            client = Client(address, timeout=_ANSWER, set_as_default=False)
+            client = _client(address)
         except (OSError, ValueError, TypeError) as error:
             self._restore_logging()
             raise ClusterError(
