@@ -106,7 +106,7 @@ pub struct DetectStats {
     pub candidates_vertex_triangle: u64,
     /// Admissible edge-edge pairs handed to the narrow phase.
     pub candidates_edge_edge: u64,
-    /// Candidates that the filters did not reject (exact root search).
+    /// Candidates whose time had to be searched: neither rejected by the filters nor in contact from the start.
     pub root_searches: u64,
     /// Further counts of the method, by name, in order.
     pub counts: Vec<(&'static str, u64)>,

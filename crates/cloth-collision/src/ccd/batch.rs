@@ -1,5 +1,5 @@
-//! Decides many pairs: two filters in single precision, then the march of those that they leave, whose answers the filter in
-//! double precision may overrule.
+//! Decides many pairs: two filters in single precision, the first of which also finds the pairs that touch from the start, then
+//! the march of those that they leave, whose answers the filter in double precision may overrule.
 
 use super::coarse;
 use super::edge_edge::EdgeEdgeMotion;
@@ -35,8 +35,10 @@ impl Pairs for [[u32; 4]] {
 /// The pairs of a batch that the filters have left; its memory is used again.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
-    /// Their numbers.
+    /// Their numbers, but for those that touch from the start.
     numbers: Vec<u32>,
+    /// The numbers of these.
+    touching: Vec<u32>,
     vertices: Vec<[u32; 4]>,
     times: Vec<f64>,
     /// Those that wait for an answer, by their place here.
@@ -44,8 +46,8 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Decides the pairs, with the single-pair tests' answers. Returns how many the filters have left;
-    /// [`Batch::contacts`] are among these.
+    /// Decides the pairs, with the single-pair tests' answers, which [`Batch::contacts`] lists. Returns how many neither were
+    /// apart by the filters nor touch from the start: contacts later than 0 are among these.
     #[inline]
     pub(crate) fn decide<P: Pairs + ?Sized>(
         &mut self,
@@ -57,9 +59,10 @@ impl Batch {
         instructions.run(Decide { kind, motions, pairs, batch: self })
     }
 
-    /// The pairs in contact, in their order, with their times.
+    /// The pairs in contact with their times, in no particular order.
     pub(crate) fn contacts(&self) -> impl Iterator<Item = (u32, f64)> {
-        self.numbers.iter().copied().zip(self.times.iter().copied()).filter(|c| c.1 != NEVER)
+        let marched = self.numbers.iter().copied().zip(self.times.iter().copied()).filter(|c| c.1 != NEVER);
+        self.touching.iter().map(|&number| (number, 0.0)).chain(marched)
     }
 }
 
@@ -103,7 +106,7 @@ impl<P: Pairs + ?Sized> Kernel for Decide<'_, P> {
 }
 
 impl Batch {
-    /// Lists the pairs that [`coarse`] does not show to be apart.
+    /// Lists the pairs that [`coarse`] does not show to be apart: those that touch from the start by themselves.
     #[inline(always)]
     fn coarse_filter<S: Singles, P: Pairs + ?Sized>(
         &mut self,
@@ -111,11 +114,14 @@ impl Batch {
         motions: &Motions,
         pairs: &P,
     ) {
-        let (count, list) = (pairs.count(), &mut self.numbers);
-        list.clear();
+        let Self { numbers: list, touching, .. } = self;
+        let (count, is_thick) = (pairs.count(), motions.thickness > 0.0);
         // Room for whole groups behind those that are kept.
+        list.clear();
         list.resize(count + MAX_SINGLES, 0);
-        let (mut kept, mut first) = (0, 0);
+        touching.clear();
+        touching.resize(if is_thick { count + MAX_SINGLES } else { 0 }, 0);
+        let (mut kept, mut kept_touching, mut first) = (0, 0, 0);
         let mut rows = [[&ORIGIN; 4]; MAX_SINGLES];
         let mut numbers = [0; MAX_SINGLES];
         while first < count {
@@ -126,11 +132,17 @@ impl Batch {
                 rows[lane] = motions.small_rows(&pairs.vertices(number));
             }
             let points = small_points::<S>(&rows);
-            let apart = coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT);
-            kept += keep::<S>(!apart, lanes, &numbers, &mut list[kept..]);
+            let mut left = !coarse::apart(kind, &points, motions.small_thickness, coarse::UNIT);
+            if is_thick && left.any() {
+                let touches = coarse::touching(kind, &points, motions.small_thickness, coarse::UNIT);
+                kept_touching += keep::<S>(left & touches, lanes, &numbers, &mut touching[kept_touching..]);
+                left = left & !touches;
+            }
+            kept += keep::<S>(left, lanes, &numbers, &mut list[kept..]);
             first += lanes;
         }
         list.truncate(kept);
+        touching.truncate(kept_touching);
     }
 
     /// Keeps the pairs that more directions do not show to be apart, and lists their vertices.

@@ -12,12 +12,22 @@
 //!   the mean, as in [`super::filter::determinant`]). The higher orders of the entries' errors, 6e² (X + Y + Z) + 6e³, are
 //!   below 32u (X′Y′ + Y′Z′ + Z′X′) − 24u (XY + YZ + ZX) with X′ = X + 16u and so on.
 //! * What underflows is below 2⁻¹⁴⁰ in all: the least normal number covers it.
+//!
+//! The other way round, a pair with two points nearer than the thickness at the start is in contact, from time 0 on, and no
+//! question in double precision can say anything else. The vector r between two points is a mean of differences with weights ≥ 0:
+//!
+//! * A coordinate of r is off by 4u for the differences, 8u for the evaluation, and 6u to 8u because the weights add up to 1 only to
+//!   3u to 4u: 20u, and |r| by 35u. Its square is off by 4u of itself.
+//! * With |r| ≤ (1 − 16u) thickness − 64u the distance is below the thickness by 29u and by 12u of the thickness: far more than the
+//!   error bounds of any question in double precision, a few hundred 2⁻⁵³.
 
 use super::filter::{
     Errors, Points, coefficients, edge_edge_differences, rootless, separated, vertex_triangle_differences,
 };
 use super::lanes::{Lanes, Vector};
 use crate::StencilKind;
+use crate::distance::edge_edge::parameters;
+use crate::distance::vertex_triangle::weights;
 
 /// Directions of Gilbert's algorithm that are tried on all pairs, and on those that are left, by measurement.
 const FIRST: usize = 1;
@@ -68,6 +78,24 @@ pub(crate) fn apart_by_more<S: Lanes>(
     }
 }
 
+/// Where two points of the features are certainly nearer than `thickness` at the start of the step.
+#[inline(always)]
+pub(crate) fn touching<S: Lanes>(kind: StencilKind, p: &Points<S>, thickness: f64, unit: f64) -> S::Mask {
+    let between = match kind {
+        StencilKind::VertexTriangle => {
+            let w = weights([p[0], p[1], p[2], p[3]]);
+            (p[1] - p[0]).scale(w[0]) + (p[2] - p[0]).scale(w[1]) + (p[3] - p[0]).scale(w[2])
+        }
+        StencilKind::EdgeEdge => {
+            let (s, t) = parameters([p[0], p[1], p[2], p[3]]);
+            let (from, to) = ((p[0] - p[2]).mix(p[0] - p[3], t), (p[1] - p[2]).mix(p[1] - p[3], t));
+            from.mix(to, s)
+        }
+    };
+    let reach = (thickness * (1.0 - 16.0 * unit) - 64.0 * unit).max(0.0);
+    S::splat(reach * reach).greater(between.norm_squared())
+}
+
 #[inline(always)]
 fn errors<S: Lanes>(unit: f64) -> Errors<S> {
     Errors { extent: S::splat(1.0), rounding: 16.0 * unit, least: f64::from(f32::MIN_POSITIVE) }
@@ -93,8 +121,8 @@ mod tests {
     use super::*;
     use crate::Vec3;
 
-    /// How many of the pairs at rest (4 points each) each filter rejects.
-    fn rejected(kind: StencilKind, x: &[Vec3], thickness: f64, unit: f64) -> [usize; 2] {
+    /// How many of the pairs at rest (4 points each) each filter rejects, and how many touch.
+    fn verdicts(kind: StencilKind, x: &[Vec3], thickness: f64, unit: f64) -> [usize; 3] {
         let motions = Motions::new(x, x, thickness);
         let points = |pair: u32| {
             let rows = motions.small_rows(&[0, 1, 2, 3].map(|k| 4 * pair + k));
@@ -108,7 +136,19 @@ mod tests {
         [
             pairs().filter(|p| apart(kind, p, small, unit)).count(),
             pairs().filter(|p| apart_by_more(kind, p, small, unit)).count(),
+            pairs().filter(|p| touching(kind, p, small, unit)).count(),
         ]
+    }
+
+    /// How many each filter rejects.
+    fn rejected(kind: StencilKind, x: &[Vec3], thickness: f64, unit: f64) -> [usize; 2] {
+        let [first, second, _] = verdicts(kind, x, thickness, unit);
+        [first, second]
+    }
+
+    /// How many touch.
+    fn touches(kind: StencilKind, x: &[Vec3], thickness: f64, unit: f64) -> usize {
+        verdicts(kind, x, thickness, unit)[2]
     }
 
     /// Pairs that are `height` apart at their middles: four points each.
@@ -155,12 +195,38 @@ mod tests {
     }
 
     #[test]
-    fn coordinates_out_of_range_reject_nothing() {
+    fn pairs_just_apart_do_not_touch_and_would_without_the_error_bound() {
+        for kind in [StencilKind::VertexTriangle, StencilKind::EdgeEdge] {
+            for thickness in [0.01, 1.0] {
+                // To rounding: a little above the thickness.
+                let x = pairs(kind, thickness * (1.0 + 1e-12));
+                assert_eq!(touches(kind, &x, thickness, UNIT), 0, "{kind:?} {thickness}");
+                let wrong = touches(kind, &x, thickness, 0.0);
+                assert!(wrong > 5, "{kind:?} {thickness}: {wrong} would touch");
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_nearer_than_the_thickness_touch() {
+        for kind in [StencilKind::VertexTriangle, StencilKind::EdgeEdge] {
+            for height in [0.0, 0.0099] {
+                let touching = touches(kind, &pairs(kind, height), 0.01, UNIT);
+                assert_eq!(touching, 4000, "{kind:?} {height}");
+            }
+            assert_eq!(touches(kind, &pairs(kind, 0.0), 0.0, UNIT), 0, "{kind:?}: no thickness");
+        }
+    }
+
+    #[test]
+    fn coordinates_out_of_range_say_nothing() {
         let mut x = pairs(StencilKind::VertexTriangle, 0.1);
         for v in &mut x {
             *v = *v * 3e307 - Vec3::repeat(1.5e308);
         }
         x.extend([Vec3::repeat(1.7e308), Vec3::repeat(-1.7e308), Vec3::zeros(), Vec3::zeros()]);
-        assert_eq!(rejected(StencilKind::VertexTriangle, &x, 0.0, UNIT), [0, 0]);
+        for thickness in [0.0, 1e308] {
+            assert_eq!(verdicts(StencilKind::VertexTriangle, &x, thickness, UNIT), [0, 0, 0], "{thickness}");
+        }
     }
 }
