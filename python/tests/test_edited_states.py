@@ -107,7 +107,7 @@ def test_damaged_and_foreign_states_are_refused(fallen: Path, tmp_path: Path) ->
         ({**header, "unpacked": -1}, packed, "when unpacked"),
         ({**header, "unpacked": "many"}, packed, "when unpacked"),
         ({**header, "unpacked": 2**24}, zlib.compress(bytes(2**26), 9), "when unpacked"),
-        (unpacked, body[:8] + b"\x09\0\0\0" + body[12:], "expected version 2 of the state of a frame, got version 9"),
+        (unpacked, body[:8] + b"\x09\0\0\0" + body[12:], "expected version 3 of the state of a frame, got version 9"),
         ({"frames": 3}, body, "expected the state of a frame, got another file of a run"),
         (unpacked, cs.Simulation(scene)._core.checkpoint(0), "starts with"),
         (unpacked, body[:-8] + bytes(8), "checksum"),

@@ -6,11 +6,13 @@
 //! ([`cloth_core::Work`]; what they take away is not counted), the most that moving colliders and pins can have done through
 //! contact, and what repulsion did against gravity as it moved apart what is nearer than the thickness, −g·Σ m Δx over its pushes.
 //! What these bend on the way is made by contact like any other energy: it goes as the square of a push, and smaller steps make less
-//! of it. A step that exceeds it by more than half of the energy that has been in the motion fails like any other, and is tried with
-//! half the size. At the floor, `time.max_halvings` halvings, it is accepted, and the report says how much was made. But where all that
-//! was made since contact began and is not lost again is more than all the energy that has been in the motion, and nothing drives it, the
-//! cloth stays where it is and loses its velocity: a board of a millimetre that hits something with one corner would else be bent by
-//! more than it weighs, in many steps.
+//! of it. A step that exceeds it by more than half of the energy that has been in the motion fails like any other, and is tried
+//! with half the size. What has been lost since is no more in it: it is at most what there is above the least potential of
+//! gravity that the cloth has had, so that a cloth that was thrown about and lies still may make no more than one that was laid
+//! down. At the floor, `time.max_halvings` halvings, it is accepted, and the report says how much was made. But where all that
+//! was made since contact began and is not lost again is more than all the energy that may be in the motion, and nothing drives
+//! it, the cloth stays where it is and loses its velocity: a board of a millimetre that hits something with one corner would else
+//! be bent by more than it weighs, in many steps.
 //!
 //! Nothing is looked at in scenes without contact, in steps in which nothing touches, and under explicit integrators. With
 //! `effects.energy_account` energy and work are reported of all steps, whatever touches, and under any integrator.
@@ -35,6 +37,8 @@ pub(crate) struct Ledger {
     /// Most kinetic and elastic energy of steps before which none was made, or what was is lost again; while pins, colliders or wind
     /// drive the cloth, that of the last step [J].
     pub(crate) scale: f64,
+    /// Least potential energy of gravity: what there is above it may be in the motion, no more [J].
+    pub(crate) lowest: f64,
 }
 
 impl Simulation {
@@ -90,9 +94,10 @@ impl Simulation {
         let Some(work) = self.work_to(end, dt) else { return Ok(untouched()) };
         let sums = |x: &[Vec3], v: &[Vec3]| {
             let energy = self.energy_at(x, v);
-            (energy.total(), energy.total() - energy.gravity)
+            (energy.total(), energy.gravity)
         };
-        let (energy, moving) = sums(&end.x, &end.v);
+        let (energy, gravity) = sums(&end.x, &end.v);
+        let moving = energy - gravity;
         let entry = EnergyReport { total: energy, pins: work.pins, air: work.air };
         if !self.judges(end) {
             note(report, entry);
@@ -101,8 +106,8 @@ impl Simulation {
         let ledger = if ledger.open {
             ledger
         } else {
-            let (level, scale) = sums(&self.state.x, &self.state.v);
-            Ledger { open: true, level, base: level, scale }
+            let (level, lowest) = sums(&self.state.x, &self.state.v);
+            Ledger { open: true, level, base: level, scale: level - lowest, lowest }
         };
         let through_contact = self.most_through_contact(end);
         let driven = through_contact > 0.0 || self.is_driven(end);
@@ -111,14 +116,16 @@ impl Simulation {
         let done = work.pins.max(0.0) + work.air.max(0.0) + through_contact + lifted;
         let (level, base) = (ledger.level + done, ledger.base + done);
         let (made, opening) = (energy - level, self.opening());
-        if made > ALLOWED * ledger.scale + opening {
-            let runs_away = energy - base > ledger.scale + opening && !driven;
+        let lowest = ledger.lowest.min(gravity);
+        let in_motion = ledger.scale.min((level - lowest).max(0.0));
+        if made > ALLOWED * in_motion + opening {
+            let runs_away = energy - base > in_motion + opening && !driven;
             if !accept || runs_away {
                 return Err(Failure::Energy { made, level });
             }
             report.energy_made += made;
             note(report, entry);
-            return Ok(Ledger { open: true, level: energy, base, scale: ledger.scale });
+            return Ok(Ledger { open: true, level: energy, base, scale: ledger.scale, lowest });
         }
         note(report, entry);
         // What was made is none of the motion's. What drives the cloth brings energy that is lost again: once it stands still,
@@ -130,7 +137,7 @@ impl Simulation {
         } else {
             ledger.scale
         };
-        Ok(Ledger { open: true, level: level.min(energy), base: base.min(energy), scale })
+        Ok(Ledger { open: true, level: level.min(energy), base: base.min(energy), scale, lowest })
     }
 
     /// The most that contact can have done to the cloth in a step: pushing along the way of the fastest collider or pin [J].

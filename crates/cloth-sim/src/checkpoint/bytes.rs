@@ -154,6 +154,7 @@ impl Writer {
         self.f64(ledger.level);
         self.f64(ledger.base);
         self.f64(ledger.scale);
+        self.f64(ledger.lowest);
         self.flags(&state.rest.asleep);
         self.numbers(&state.rest.calm);
     }
@@ -317,8 +318,13 @@ impl Reader<'_> {
             return Err(invalid(format!("at most {most} halvings"), halvings.to_string()));
         }
         let control = Control { size: self.f64()?, error: self.f64()? };
-        let ledger =
-            Ledger { open: self.u64()? != 0, level: self.f64()?, base: self.f64()?, scale: self.f64()? };
+        let ledger = Ledger {
+            open: self.u64()? != 0,
+            level: self.f64()?,
+            base: self.f64()?,
+            scale: self.f64()?,
+            lowest: self.f64()?,
+        };
         let pace = Pace { halvings: halvings as u32, good: good as u32, control, ledger };
         let rest =
             Rest { asleep: self.numbers()?.into_iter().map(|a| a != 0.0).collect(), calm: self.numbers()? };

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-const STATE: Kind = Kind { magic: *b"CLOTHSTA", version: 2, name: "the state of a frame" };
+const STATE: Kind = Kind { magic: *b"CLOTHSTA", version: 3, name: "the state of a frame" };
 /// Differences that are listed.
 const LISTED: usize = 32;
 /// A pin stands where the state has its vertex but for rounding up to this distance [m].

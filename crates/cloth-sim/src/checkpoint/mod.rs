@@ -15,7 +15,7 @@ use cloth_response::Sides;
 
 pub use continued::Continued;
 
-const CHECKPOINT: Kind = Kind { magic: *b"CLOTHSIM", version: 7, name: "a checkpoint" };
+const CHECKPOINT: Kind = Kind { magic: *b"CLOTHSIM", version: 8, name: "a checkpoint" };
 
 impl Simulation {
     /// Scene, assets, options, the full state and the report as bytes: [`Simulation::resume`] goes on to the same bits.
