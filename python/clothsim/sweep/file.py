@@ -28,6 +28,10 @@ _KEYS = (
 _MOST_BYTES = 4 * 2**20  # far more than any sweep; what is no sweep is not read whole
 _MOST_LEVELS = 60
 _SEED_KEYS = ("count", "first", "disturbance", "draw")
+# Keys that mean nothing in a scene: in [vary] or [set] they were written below a table that they belong above.
+_OWN_KEYS = {"combine", "metrics", "series", "keep", "timeout", "retries", "checkpoint_interval"}
+# What Python calls the keys of [seeds].
+_RENAMED = {"seeds": "seeds.count", "seed": "seeds.first", "disturbance": "seeds.disturbance"}
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,10 @@ def read(path: str | os.PathLike[str], fixed: Mapping[str, Any] | None = None) -
         return _made(_parsed(where), where, dict(fixed or {}))
     except InvalidInput as error:
         known = {key: getattr(error, key) for key in ("name", "expected", "got")}
-        raise InvalidInput(brief(f"{where}: {error}"), **known) from error
+        text = str(error)
+        if (key := _RENAMED.get(known["name"])) and text.startswith(f"{known['name']}: "):
+            text, known["name"] = f"{key}{text.removeprefix(known['name'])}", key
+        raise InvalidInput(brief(f"{where}: {text}"), **known) from error
     except InvalidScene as error:
         known = {key: getattr(error, key) for key in ("file", "line", "key", "expected", "got", "nearest")}
         raise InvalidScene(brief(f"{where}: {error}"), **known) from error
@@ -90,12 +97,17 @@ def _made(tables: dict[str, Any], where: Path, fixed: dict[str, Any]) -> SweepFi
     _known("", tables, _KEYS)
     seeds = _table(tables, "seeds")
     _known("seeds.", seeds, _SEED_KEYS)
+    for name in ("vary", "set"):
+        for key in filter(_OWN_KEYS.__contains__, _table(tables, name)):
+            expected, got = "a key of the scene", f'"{key}", one of the sweep, which comes before its tables'
+            raise InvalidInput(
+                f"{name}.{key}: expected {expected}, got {got}", name=f"{name}.{key}", expected=expected, got=key
+            )
     if "seeds" in tables and "count" not in seeds:
         raise InvalidInput("seeds.count: expected a whole number ≥ 1, got nothing", name="seeds.count")
     same = ("name", "combine", "metrics", "series", "keep", "timeout", "threads", "device", "checkpoint_interval")
     given = {key: tables[key] for key in same if key in tables}
-    renamed = {"count": "seeds", "first": "seed", "disturbance": "disturbance"}
-    given |= {name: seeds[key] for key, name in renamed.items() if key in seeds}
+    given |= {name: seeds[key] for name, path in _RENAMED.items() if (key := path.removeprefix("seeds.")) in seeds}
     request = Request(
         _scenes(tables.get("scene"), where),
         _flat(_table(tables, "vary"), _is_row),
