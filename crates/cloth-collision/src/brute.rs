@@ -1,6 +1,7 @@
 //! Every pair against every pair: the oracle.
 
 use crate::ccd::narrow_test;
+use crate::ccd::separation::WIDENED;
 use crate::{CollisionMesh, Contacts, DetectError, Detector, Query, Vec3};
 use std::time::Instant;
 
@@ -65,8 +66,10 @@ impl Detector for BruteForce {
     }
 }
 
-/// Closed overlap of the swept boxes of two features, with the thickness added along each axis.
+/// Whether the swept boxes of two features come within the thickness along every axis, to the rounding of the narrow phase, which
+/// answers for the pairs at the very thickness.
 fn boxes_overlap(query: &Query<'_>, first: &[u32], second: &[u32]) -> bool {
+    let threshold = query.thickness * WIDENED;
     (0..3).all(|axis| {
         let range = |vertices: &[u32]| {
             let mut range = (f64::INFINITY, f64::NEG_INFINITY);
@@ -82,7 +85,6 @@ fn boxes_overlap(query: &Query<'_>, first: &[u32], second: &[u32]) -> bool {
             range
         };
         let (a, b) = (range(first), range(second));
-        // One comparison rounds once, upwards: it cannot lose a pair.
-        a.0 <= (b.1 + query.thickness).next_up() && b.0 <= (a.1 + query.thickness).next_up()
+        a.0 - b.1 <= threshold && b.0 - a.1 <= threshold
     })
 }

@@ -25,7 +25,7 @@ pub(crate) mod lanes;
 mod lanes_agree;
 mod march;
 pub(crate) mod motions;
-mod separation;
+pub(crate) mod separation;
 mod vertex_triangle;
 
 use crate::{StencilKind, Vec3};

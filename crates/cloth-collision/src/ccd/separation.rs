@@ -18,6 +18,9 @@ pub(crate) struct Relative<L, const K: usize> {
     pub(crate) is_thick: bool,
 }
 
+/// The thickness is widened by two roundings: pairs all of whose differences of coordinates are beyond that are apart.
+pub(crate) const WIDENED: f64 = 1.0 + 4.0 * f64::EPSILON;
+
 /// Answer of [`Relative::separated_until`]: the direction separates up to and including t1.
 pub(crate) const BEYOND_END: f64 = 2.0;
 
@@ -84,10 +87,10 @@ impl<L: Lanes, const K: usize> Relative<L, K> {
     /// Where a coordinate axis separates the sets during the whole step.
     ///
     /// Along an axis the only error is that of the differences, which is relative: their signs are exact, and this
-    /// decides pairs that the error bounds of other directions cannot. The thickness is widened by two roundings.
+    /// decides pairs that the error bounds of other directions cannot.
     #[inline(always)]
     pub(crate) fn separated_by_axis(&self) -> L::Mask {
-        let threshold = self.thickness * L::splat(1.0 + 4.0 * f64::EPSILON);
+        let threshold = self.thickness * L::splat(WIDENED);
         let below = L::splat(0.0) - threshold;
         let mut is_apart = threshold.greater(threshold);
         for axis in 0..3 {

@@ -160,10 +160,36 @@ impl Simulation {
 
     /// The dynamics of awake cloth with its part of [`Simulation::memories`].
     fn awake(&self, memories: &[Vec<f64>]) -> Result<Awake, SimError> {
-        let cloths: Vec<usize> =
-            (0..self.bodies.cloth.len()).filter(|&c| !self.state.rest.asleep[c]).collect();
+        let (asleep, cloths): (Vec<usize>, Vec<usize>) =
+            (0..self.bodies.cloth.len()).partition(|&c| self.state.rest.asleep[c]);
+        // By what sleeps alone: the same bits whenever it is asked.
+        let (sleeping, its_own) = self.dynamics_of(&asleep, memories)?;
+        let own = |all: &[Vec3]| its_own.iter().map(|&i| all[i]).collect::<Vec<_>>();
+        let energy = sleeping.system().energy(&own(&self.state.x), &own(&self.state.v));
+        let mut awake =
+            Awake { integrator: None, cloths, vertices: vec![], pins: vec![], pin_rows: vec![], energy };
+        if awake.cloths.is_empty() {
+            return Ok(awake);
+        }
+        let (integrator, vertices) = self.dynamics_of(&awake.cloths, memories)?;
+        for (row, &v) in self.pins.vertices.iter().enumerate() {
+            if let Ok(own) = vertices.binary_search(&(v as usize)) {
+                awake.pins.push(own as u32);
+                awake.pin_rows.push(row);
+            }
+        }
+        (awake.integrator, awake.vertices) = (Some(integrator), vertices);
+        Ok(awake)
+    }
+
+    /// The dynamics of some cloths by themselves, and the vertex of each of its own.
+    fn dynamics_of(
+        &self,
+        cloths: &[usize],
+        memories: &[Vec<f64>],
+    ) -> Result<(Integrator, Vec<usize>), SimError> {
         let (mut vertices, mut parts) = (Vec::new(), Vec::new());
-        for &c in &cloths {
+        for &c in cloths {
             let body = &self.bodies.cloth[c];
             parts.push(ClothPart {
                 mesh: &body.mesh,
@@ -175,32 +201,17 @@ impl Simulation {
             });
             vertices.extend(body.first_vertex..body.first_vertex + body.x.len());
         }
-        let (mut pins, mut pin_rows) = (Vec::new(), Vec::new());
-        for (row, &v) in self.pins.vertices.iter().enumerate() {
-            if let Ok(own) = vertices.binary_search(&(v as usize)) {
-                pins.push(own as u32);
-                pin_rows.push(row);
-            }
-        }
-        let energy = self.integrator.system().energy(&self.state.x, &self.state.v);
-        let mut awake = Awake { integrator: None, cloths, vertices, pins, pin_rows, energy };
-        if awake.cloths.is_empty() {
-            return Ok(awake);
-        }
         let error =
             |error: cloth_core::CoreError| SimError::InvalidScene(plan::core_error(&self.scene, &error));
         let environment = crate::simulation::environment(&self.scene);
-        let mut system = ClothSystem::new(&parts, &environment, awake.vertices.len()).map_err(error)?;
+        let mut system = ClothSystem::new(&parts, &environment, vertices.len()).map_err(error)?;
         crate::simulation::keep_history(&self.scene, &mut system).map_err(error)?;
         let params = *self.integrator.params();
         let mut integrator = Integrator::new(system, params, Arc::clone(&self.pool)).map_err(error)?;
-        let mine = self.remembering().zip(memories).filter(|(cloth, _)| awake.cloths.contains(cloth));
-        let own: Vec<f64> = mine.flat_map(|(_, memory)| memory).copied().collect();
+        let theirs = self.remembering().zip(memories).filter(|(cloth, _)| cloths.contains(cloth));
+        let own: Vec<f64> = theirs.flat_map(|(_, memory)| memory).copied().collect();
         integrator.set_memory(&own).map_err(error)?;
-        let of_awake = integrator.system().energy(&awake.gather(&self.state.x), &awake.gather(&self.state.v));
-        awake.energy = minus(energy, of_awake);
-        awake.integrator = Some(integrator);
-        Ok(awake)
+        Ok((integrator, vertices))
     }
 
     /// Each hinge of a bending law with memory as it stands; none where no material asks for memory.
@@ -216,15 +227,5 @@ impl Simulation {
             *hinge = cloth_core::bending::HingeState { vertices: hinge.vertices, ..mine };
         }
         hinges
-    }
-}
-
-fn minus(a: Energy, b: Energy) -> Energy {
-    Energy {
-        kinetic: a.kinetic - b.kinetic,
-        stretch: a.stretch - b.stretch,
-        shear: a.shear - b.shear,
-        bending: a.bending - b.bending,
-        gravity: a.gravity - b.gravity,
     }
 }
