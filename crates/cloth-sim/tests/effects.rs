@@ -9,7 +9,7 @@ use common::{MATERIAL, bits, build, drape, scene, simulation};
 /// Everything the engine may decide by itself that does not change results.
 const AUTO: &str = "\n[effects]\nself_collision = \"auto\"\nccd = \"auto\"\n";
 
-/// A standing sheet that falls and crumples on a floor.
+/// A standing sheet that is thrown on a floor and crumples.
 fn crumple(n: usize) -> String {
     format!(
         r#"
@@ -25,6 +25,7 @@ mesh = {{ generator = "grid", width = 0.3, height = 0.5, nx = {n}, ny = {n} }}
 {MATERIAL}
 rotation = {{ axis = [1.0, 0.1, 0.05], angle = 1.5 }}
 position = [0.0, 0.27, 0.0]
+velocity = [0.0, -4.0, 0.0]
 [[collider]]
 name = "floor"
 shape = {{ type = "plane", half_size = 1.0 }}
