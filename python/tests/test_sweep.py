@@ -371,10 +371,10 @@ def test_a_run_that_takes_too_long_is_stopped(tmp_path: Path, scheduler: str) ->
 
 def test_a_run_that_hangs_within_a_frame_is_ended(tmp_path: Path) -> None:
     """The limit is looked at between frames; a worker of ours goes with a run whose frame does not end."""
-    hangs = "timeout = 2\n[vary]\nduration = [0.01, 40.0]\n" + SMALL.replace("fps = 60", "fps = 0.01")
+    hangs = "timeout = 4\n[vary]\nduration = [0.01, 400.0]\n" + SMALL.replace("fps = 60", "fps = 0.001")
     sweep = cs.sweep.run_file(write(tmp_path, hangs), processes=1, progress=False)
     assert [row["status"] for row in sweep.rows()] == ["ok", "timed out"]
-    assert sweep.rows()[1]["error"] == "stopped after 2 s, within a frame"
+    assert sweep.rows()[1]["error"] == "stopped after 4 s, within a frame"
 
 
 def test_a_run_that_always_loses_its_worker_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

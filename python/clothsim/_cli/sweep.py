@@ -11,6 +11,7 @@ from typing import Any
 
 from clothsim._cli.arguments import add_existing, count, folder, written
 from clothsim._cli.study import fixed_values, interruptible
+from clothsim._nearest import brief
 
 __all__ = ["EXAMPLE", "HELP", "NAME", "add_arguments", "execute"]
 
@@ -18,6 +19,7 @@ NAME = "sweep"
 HELP = "Run an ensemble: scenes over parameters and seeds, on this machine's cores or a Dask cluster; Parquet tables."
 EXAMPLE = "clothsim sweep examples/sweep.toml -o out/sweep"
 _LISTED = 40  # runs of a dry run that are shown
+_MOST_OF_A_LINE = 1000  # characters: values may be of any length
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -100,7 +102,7 @@ def _text(request: Any) -> str:
     for run in request.runs[:_LISTED]:
         parts = [names[run.scene], label(run.settings), "" if run.seed is None else f"seed {run.seed}"]
         error = f": {run.error}" if run.error else ""
-        lines.append(f"  {run.number:>{width}}  {', '.join(p for p in parts if p)}{error}")
+        lines.append(brief(f"  {run.number:>{width}}  {', '.join(p for p in parts if p)}{error}", _MOST_OF_A_LINE))
     if len(request.runs) > _LISTED:
         lines.append(f"  … and {len(request.runs) - _LISTED} more (--json lists all)")
     return "\n".join(lines)
